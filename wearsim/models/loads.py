@@ -124,7 +124,8 @@ class FollowerLoad(Load):
         self.preload, self.spring = options.preload, options.stiffness
         self.feedback = options.feedback
         arm = isinstance(options, ArmOptions)
-        self._external = _periodic(options.external, arm) if options.external else None
+        #: external force [N] or torque [N m] at angles of the cam [rad]
+        self.external = _periodic(options.external, arm) if options.external else None
 
     def force(self, time: FloatArray) -> FloatArray:
         """Return the preload at each `time` [s], shape as `time`."""
@@ -133,17 +134,6 @@ class FollowerLoad(Load):
     def mean(self, start: float, stop: float) -> float:
         """Return the preload."""
         return self.preload
-
-    @property
-    def has_external(self) -> bool:
-        """Whether there is an external force."""
-        return self._external is not None
-
-    def external(self, theta: FloatArray) -> FloatArray:
-        """Return the external force [N] or torque [N m] at angles of the cam [rad]."""
-        if self._external is None:
-            return np.zeros_like(theta)
-        return np.asarray(self._external(np.mod(theta, math.tau)))
 
 
 def _periodic(file: InputFile, arm: bool) -> Callable[[FloatArray], FloatArray]:
@@ -167,7 +157,7 @@ def _periodic(file: InputFile, arm: bool) -> Callable[[FloatArray], FloatArray]:
         raise mistake_in(file.path, f"the {name} jumps", got, "equal values at 0 and 360 deg")
     force[-1], start = force[0], float(angle[0])
     spline = CubicSpline(angle - start, force, bc_type="periodic")
-    return lambda theta: spline(np.mod(theta - start, math.tau))
+    return lambda theta: np.asarray(spline(np.mod(np.mod(theta, math.tau) - start, math.tau)))
 
 
 class ConstantLoad(Load):

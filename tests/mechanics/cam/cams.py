@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
-from wearsim.mechanics.cam import Follower, Motion, Segment
+from wearsim.mechanics.cam import Follower, Motion, Panel, Segment
 from wearsim.plugins import MotionLawSpec, registry
+from wearsim.types import IntArray
 
 MM = 1e-3
 OMEGA = 1000.0 * math.tau / 60.0
@@ -63,3 +65,8 @@ def random_follower(generator: np.random.Generator, kind: str) -> Follower:
         arm_length=arm,
         towards=bool(generator.integers(2)),
     )
+
+
+def segments_of(panels: Sequence[Panel]) -> IntArray:
+    """Return the segments of panels, which broadcast to angles of the shape (panels, points)."""
+    return np.array([[panel.segment] for panel in panels])

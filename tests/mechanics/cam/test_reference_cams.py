@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from cams import MM, OMEGA, ROLLER, rise_and_return
+from cams import MM, OMEGA, ROLLER, rise_and_return, segments_of
 
 from wearsim.mechanics.cam import (
     Arc,
@@ -30,7 +30,7 @@ def force_of(follower, found):
 
 
 def kinematics_in(follower, motion):
-    return lambda panel, theta: follower.kinematics(motion.lift_in(panel.segment, theta))
+    return lambda panels, theta: follower.kinematics(motion.lift_in(segments_of(panels), theta))
 
 
 def integral(follower, motion, quantity):
@@ -38,7 +38,7 @@ def integral(follower, motion, quantity):
     stations = choose_stations(motion.panels, lambda p, x: quantity(at(p, x))[None], 1e-10)
     panels = zip(stations.panels, stations.numbers, stations.first, strict=True)
     return sum(
-        (stations.weight[i : i + n] * quantity(at(p, stations.angle[i : i + n]))).sum()
+        (stations.weight[i : i + n] * quantity(at([p], stations.angle[None, i : i + n]))).sum()
         for p, n, i in panels
     )
 

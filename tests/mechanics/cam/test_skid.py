@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from cams import segments_of
 from scipy.optimize import brentq
 
 from wearsim.mechanics.cam import Panel
@@ -18,9 +19,9 @@ WHOLE = [Panel(0, 0.0, math.tau, False)]
 def stepped(reach: float, drag: float = 0.0, sign: float = 1.0):
     """Return requirements of a roller that turns twice as fast in the second half of a turn."""
 
-    def rolling(panel: Panel, theta: np.ndarray) -> Rolling:
-        one = np.ones_like(theta)
-        return Rolling(sign * (1.0 + panel.segment) * one, 0.0 * one, drag * one, reach * one)
+    def rolling(panels: list[Panel], theta: np.ndarray) -> Rolling:
+        one, segments = np.ones_like(theta), segments_of(panels)
+        return Rolling(sign * (1.0 + segments) * one, 0.0 * one, drag * one, reach * one)
 
     return rolling
 
@@ -73,7 +74,7 @@ def test_slip_goes_on_through_a_jump_and_turns() -> None:
 def accelerated(reach: float, drag: float = 0.0, size: float = 1.0):
     """Return requirements of a roller at the speed 3 + size sin(angle)."""
 
-    def rolling(_: Panel, theta: np.ndarray) -> Rolling:
+    def rolling(_: list[Panel], theta: np.ndarray) -> Rolling:
         one = np.ones_like(theta)
         return Rolling(3.0 + size * np.sin(theta), size * np.cos(theta), drag * one, reach * one)
 

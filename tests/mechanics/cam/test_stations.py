@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from cams import MM, Motion, rise_and_return, segment
+from cams import MM, Motion, rise_and_return, segment, segments_of
 
 from wearsim.mechanics.cam import Panel, Stations, choose_stations, extreme, motion_mistakes
 from wearsim.mechanics.cam.stations import NUMBERS, interpolation, lobatto, moved_stations
@@ -33,8 +33,8 @@ def test_numbers_of_stations_are_nested():
 def test_dwell_has_one_station_and_a_cycloidal_rise_thirteen():
     motion = rise_and_return("cycloidal")
 
-    def lift(panel, theta):
-        return 1.0 + motion.lift_in(panel.segment, theta)[:1] / MM
+    def lift(panels, theta):
+        return 1.0 + motion.lift_in(segments_of(panels), theta)[:1] / MM
 
     stations = choose_stations(motion.panels, lift, 2.5e-4)
     assert stations.numbers == (1, 13, 1, 13)
@@ -43,14 +43,14 @@ def test_dwell_has_one_station_and_a_cycloidal_rise_thirteen():
 
 
 def test_chosen_stations_represent_a_sharp_peak_within_the_tolerance():
-    def peak(panel, theta):
+    def peak(panels, theta):
         return np.exp(-(((theta - 1.0) / 0.1) ** 2))[None]
 
     stations = choose_stations([WHOLE], peak, 1e-4)
-    angle, values = stations.values_at(peak(WHOLE, stations.angle)[0], 50)
+    angle, values = stations.values_at(peak([WHOLE], stations.angle)[0], 50)
     assert len(stations.panels) > 1
-    assert values == pytest.approx(peak(WHOLE, angle)[0], abs=1e-4)
-    integral = stations.weight @ peak(WHOLE, stations.angle)[0]
+    assert values == pytest.approx(peak([WHOLE], angle)[0], abs=1e-4)
+    integral = stations.weight @ peak([WHOLE], stations.angle)[0]
     assert integral == pytest.approx(0.1 * math.sqrt(math.pi), rel=1e-4)
 
 
@@ -64,7 +64,7 @@ def test_integral_converges_faster_than_any_power():
 
 
 def test_extreme_is_found_to_round_off():
-    value, angle = extreme([WHOLE], lambda panel, theta: np.sin(3.0 * theta) + 0.1 * theta)
+    value, angle = extreme([WHOLE], lambda panels, theta: np.sin(3.0 * theta) + 0.1 * theta)
     exact = (math.acos(-0.1 / 3.0) + 2.0 * math.tau) / 3.0
     assert value == pytest.approx(math.sin(3.0 * exact) + 0.1 * exact, rel=1e-14)
     assert angle == pytest.approx(exact, rel=1e-6)
@@ -176,7 +176,7 @@ def test_moved_stations_keep_polynomials_and_equal_panels():
 
 
 def test_choice_halves_panels_and_is_scaled_by_the_whole_turn():
-    def quantities(panel, theta):
+    def quantities(panels, theta):
         return np.stack([np.abs(np.sin(theta - 1.0)), 1e-9 * np.sin(40.0 * theta) + 1.0])
 
     stations = choose_stations([WHOLE], quantities, 1e-3)
@@ -184,7 +184,7 @@ def test_choice_halves_panels_and_is_scaled_by_the_whole_turn():
     starts = [panel.start for panel in stations.panels]
     assert starts == sorted(starts)
     assert all(n in NUMBERS for n in stations.numbers)
-    angle, values = stations.values_at(quantities(WHOLE, stations.angle)[0], 30)
+    angle, values = stations.values_at(quantities([WHOLE], stations.angle)[0], 30)
     away = np.abs(values - np.abs(np.sin(angle - 1.0)))
     # the kinks are in panels that were halved six times
     width = min(panel.stop - panel.start for panel in stations.panels)
@@ -206,15 +206,15 @@ def test_choice_halves_panels_and_is_scaled_by_the_whole_turn():
         whole[count] = np.abs(interpolation(count, places) @ values - exact).max()
     least = next(count for count in NUMBERS if whole[count] <= 1e-6)
     assert [one.numbers for one in grows] == [(least,)] * 3
-    many = choose_stations([WHOLE], lambda panel, theta: np.sin(theta)[None], 1e-3)
+    many = choose_stations([WHOLE], lambda panels, theta: np.sin(theta)[None], 1e-3)
     assert many.numbers == (13,)
 
 
 def test_extreme_of_equal_values_is_the_first():
     halves = Panel(0, 0.0, math.pi, dwell=False), Panel(1, math.pi, math.tau, dwell=False)
 
-    def quantity(panel, theta):  # the same value in both, but for its rounding error
-        return np.sin(theta) ** 2 * (1.0 + panel.segment * 1e-15)
+    def quantity(panels, theta):  # the same value in both, but for its rounding error
+        return np.sin(theta) ** 2 * (1.0 + segments_of(panels) * 1e-15)
 
     value, angle = extreme(halves, quantity)
     assert value == pytest.approx(1.0, rel=1e-14)
@@ -222,7 +222,7 @@ def test_extreme_of_equal_values_is_the_first():
 
 
 def test_extreme_skips_values_that_are_not_defined():
-    def quantity(panel, theta):
+    def quantity(panels, theta):
         return np.where(theta > 3.0, np.nan, theta)
 
     value, angle = extreme([WHOLE], quantity)

@@ -98,9 +98,9 @@ def test_skid_balances_the_momentum_of_the_roller():
     for arc in turn.arcs:
         theta = np.linspace(arc.theta[0], arc.theta[-1], 2001)
         panel = turn.panels[arc.panel]
-        point, slip = turn.at(panel, theta), arc.slip_at(theta)
-        actual = point.kinematics.spin - slip
-        force = np.sign(slip) * friction * point.normal_force
+        point, slip = turn.at([panel], theta[None]), arc.slip_at(theta)
+        actual = point.kinematics.spin[0] - slip
+        force = np.sign(slip) * friction * point.normal_force[0]
         acceleration = np.trapezoid(force * radius - torque, theta) / speed
         change = inertia * speed * (actual[-1] - actual[0])
         scale = inertia * speed * 0.2
@@ -119,8 +119,8 @@ def test_energy_of_skids_is_that_of_the_stations():
     exact = 0.0
     for arc in turn.arcs:
         theta = np.linspace(arc.theta[0], arc.theta[-1], 4001)
-        fine = turn.at(turn.panels[arc.panel], theta)
-        lost = 0.1 * fine.normal_force * 20e-3 * np.abs(arc.slip_at(theta))
+        fine = turn.at([turn.panels[arc.panel]], theta[None])
+        lost = 0.1 * fine.normal_force[0] * 20e-3 * np.abs(arc.slip_at(theta))
         exact += np.trapezoid(lost, theta)
     assert energy == pytest.approx(exact, rel=1e-3)
 
@@ -145,16 +145,16 @@ def groove(preload="10 N"):
 def test_groove_changes_its_flank_where_the_load_vanishes():
     turn = CamTurn(groove()).checked()
     edges = [panel.start for panel in turn.panels]
-    for panel in turn.panels:
-        middle = turn.at(panel, np.linspace(panel.start, panel.stop, 11)[1:-1])
-        assert (middle.normal_force > 0.0).all()
-        assert len(np.unique(middle.inner)) == 1
-    flanks = [bool(turn.at(p, np.array([0.5 * (p.start + p.stop)])).inner[0]) for p in turn.panels]
+    ends = np.array([(panel.start, panel.stop) for panel in turn.panels]).T
+    within = turn.at(turn.panels, np.linspace(*ends, 11, axis=1)[:, 1:-1])
+    assert (within.normal_force > 0.0).all()
+    assert all(len(np.unique(inner)) == 1 for inner in within.inner)
+    flanks = within.inner[:, 0].tolist()
     assert True in flanks
     assert False in flanks
     assert len(edges) > 4
-    inner = turn.at(turn.panels[flanks.index(True)], np.array([2.6])).kinematics
-    assert inner.spin[0] < 0.0
+    inner = turn.at([turn.panels[flanks.index(True)]], np.array([[2.6]])).kinematics
+    assert inner.spin[0, 0] < 0.0
 
 
 def test_change_of_flank_is_a_jump_of_the_spin_and_a_skid():

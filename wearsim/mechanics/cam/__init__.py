@@ -13,7 +13,14 @@ from wearsim.mechanics.cam.shapes import (
     three_arc_cam,
 )
 from wearsim.mechanics.cam.skid import Rolling, SkidArc, skid_arcs
-from wearsim.mechanics.cam.stations import Stations, choose_stations, extreme, moved_stations
+from wearsim.mechanics.cam.stations import (
+    Quantity,
+    Stations,
+    choose_stations,
+    extreme,
+    extremes,
+    moved_stations,
+)
 from wearsim.mechanics.cam.surface import surface_points
 
 __all__ = [
@@ -23,6 +30,7 @@ __all__ = [
     "Line",
     "Motion",
     "Panel",
+    "Quantity",
     "RollerKinematics",
     "Rolling",
     "Segment",
@@ -33,6 +41,7 @@ __all__ = [
     "choose_stations",
     "eccentric_cam",
     "extreme",
+    "extremes",
     "greatest",
     "greatest_value",
     "integral_error",

@@ -11,7 +11,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from wearsim.types import FloatArray
+from wearsim.types import FloatArray, IntArray
 
 #: lift and its two derivatives, shape (3, points), at angles from the start of a segment [rad]
 Lift: TypeAlias = Callable[[FloatArray], FloatArray]
@@ -112,15 +112,20 @@ class Motion:
         """Return the number and the name of a segment, "segment 2 (cycloidal)"."""
         return f"segment {number + 1} ({self.segments[number].name})"
 
-    def lift_in(self, segment: int, theta: FloatArray) -> FloatArray:
-        """Return lift and derivatives, shape (3, points), at angles within a segment [rad]."""
-        part = self.segments[segment]
-        inside = np.clip(np.asarray(theta) - self.starts[segment], 0.0, part.angle)
-        lift = np.array(part.lift(inside))
-        lift[0] += self.bases[segment]
+    def lift_in(self, segments: int | IntArray, theta: FloatArray) -> FloatArray:
+        """Return lift and derivatives, shape (3, ...), at angles [rad] within segments by number.
+
+        Both arrays broadcast to the shape of the angles.
+        """
+        segments, lift = np.broadcast_to(segments, theta.shape), np.empty((3, *theta.shape))
+        for number in np.unique(segments).tolist():
+            part, chosen = self.segments[number], segments == number
+            inside = np.clip(theta[chosen] - self.starts[number], 0.0, part.angle)
+            lift[:, chosen] = part.lift(inside)
+            lift[0, chosen] += self.bases[number]
         return lift
 
-    def segment_at(self, theta: FloatArray) -> FloatArray:
+    def segment_at(self, theta: FloatArray) -> IntArray:
         """Return the number of the segment at each angle; at a boundary the one that follows."""
         # an angle written in degrees is at the boundary to a few roundings
         places = np.searchsorted(self.starts, np.mod(theta, math.tau) + 1e-13, side="right") - 1
@@ -129,11 +134,7 @@ class Motion:
     def lift(self, theta: FloatArray) -> FloatArray:
         """Return lift and derivatives at any angles [rad], shape (3, points)."""
         theta = np.mod(np.atleast_1d(np.asarray(theta, dtype=np.float64)), math.tau)
-        places, lift = self.segment_at(theta), np.empty((3, len(theta)))
-        for number in np.unique(places):
-            chosen = places == number
-            lift[:, chosen] = self.lift_in(int(number), theta[chosen])
-        return lift
+        return self.lift_in(self.segment_at(theta), theta)
 
     def jerk(self, theta: FloatArray) -> FloatArray:
         """Return the third derivative of the lift at any angles [rad], shape (points,).

@@ -78,7 +78,7 @@ class SkidArc:
 
 
 def skid_arcs(
-    panels: Sequence[Panel], rolling: Callable[[Panel, FloatArray], Rolling]
+    panels: Sequence[Panel], rolling: Callable[[Sequence[Panel], FloatArray], Rolling]
 ) -> list[SkidArc]:
     """Return the arcs of a turn in which the roller skids, in the order of the angle.
 
@@ -87,15 +87,15 @@ def skid_arcs(
     panels : sequence of Panel
         Smooth parts of the turn.
     rolling : callable
-        Requirements of rolling at angles within a panel.
+        Requirements of rolling at angles within panels, arrays of shape (panels, points).
 
     Raises
     ------
     ValueError
         If the roller rolls nowhere, or its skid does not repeat from turn to turn.
     """
-    grids = [np.linspace(panel.start, panel.stop, _POINTS) for panel in panels]
-    values = [rolling(*pair) for pair in zip(panels, grids, strict=True)]
+    grids = np.stack([np.linspace(panel.start, panel.stop, _POINTS) for panel in panels])
+    values = [Rolling(*rows) for rows in zip(*rolling(panels, grids), strict=True)]
     demands = [np.abs(value.demand()) for value in values]
     jumps = [float(values[k].spin[0] - values[k - 1].spin[-1]) for k in range(len(panels))]
     size = max(float(np.abs(value.spin).max()) for value in values)

@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import TypeAlias
 
 import numpy as np
 
@@ -195,11 +196,12 @@ def moved_stations(old: Stations, new: Stations) -> tuple[FloatArray, IntArray, 
     return matrix, np.where(kept, -1, np.searchsorted(common, middles)), np.array(parts)
 
 
+#: Values at angles [rad] within panels, both of shape (panels, points), or several of such values.
+Quantity: TypeAlias = Callable[[Sequence[Panel], FloatArray], FloatArray]
+
+
 def choose_stations(
-    panels: Sequence[Panel],
-    quantities: Callable[[Panel, FloatArray], FloatArray],
-    tolerance: float,
-    number: int | None = None,
+    panels: Sequence[Panel], quantities: Quantity, tolerance: float, number: int | None = None
 ) -> Stations:
     """Return stations that represent some quantities and their integrals.
 
@@ -207,64 +209,84 @@ def choose_stations(
     ----------
     panels : sequence of Panel
         Smooth parts of the turn.
-    quantities : callable
-        Quantities at angles within a panel, shape (quantities, points).
+    quantities : Quantity
+        Their values, shape (quantities, panels, points).
     tolerance : float
         Allowed error between the stations and of the integrals, of the greatest value.
     number : int, optional
         Stations on each moving panel, instead of 7, 13 or 25 as the tolerance requires; a dwell
         has one.
     """
-    places = np.linspace(0.0, 1.0, _SAMPLES)
-    samples = (
-        quantities(panel, panel.start + (panel.stop - panel.start) * places[::8])
-        for panel in panels
-    )
-    scale = np.max([np.abs(sample).max(axis=1) for sample in samples], axis=0)
 
-    def split(panel: Panel, halvings: int) -> list[tuple[Panel, int]]:
-        if panel.dwell or number is not None:
-            return [(panel, 1 if panel.dwell or number is None else number)]
-        width = panel.stop - panel.start
-        exact = quantities(panel, panel.start + width * places)
-        for count in NUMBERS:
-            values = quantities(panel, panel.start + width * lobatto(count)[0])
-            error = np.abs(values @ interpolation(count, places).T - exact).max(axis=1)
-            if (error <= tolerance * scale).all() or (
-                count == NUMBERS[-1] and halvings == _MOST_HALVINGS
-            ):
-                return [(panel, count)]
-        middle = 0.5 * (panel.start + panel.stop)
-        halves = panel._replace(stop=middle), panel._replace(start=middle)
-        return [item for half in halves for item in split(half, halvings + 1)]
+    def values_at(places: FloatArray) -> FloatArray:
+        start, stop = (np.array([panel[end] for panel in moving])[:, None] for end in (1, 2))
+        return quantities(moving, start + (stop - start) * places)
 
-    chosen = [item for panel in panels for item in split(panel, 0)]
-    return Stations(tuple(panel for panel, _ in chosen), tuple(count for _, count in chosen))
+    moving, places, halvings = list(panels), np.linspace(0.0, 1.0, _SAMPLES), 0
+    scale = np.abs(values_at(places[::8])).max(axis=(1, 2))[:, None]
+    moving = [panel for panel in panels if not panel.dwell and number is None]
+    chosen = [(panel, 1 if panel.dwell else number or 1) for panel in panels if panel not in moving]
+    while moving:
+        exact = values_at(places)
+        counts = [NUMBERS[-1] if halvings == _MOST_HALVINGS else 0] * len(moving)
+        for count in reversed(NUMBERS):
+            between = values_at(lobatto(count)[0]) @ interpolation(count, places).T
+            error = np.abs(between - exact).max(axis=2)
+            for place in np.flatnonzero((error <= tolerance * scale).all(axis=0)):
+                counts[place] = count
+        pairs = list(zip(moving, counts, strict=True))
+        chosen += [pair for pair in pairs if pair[1]]
+        middles = [(panel, 0.5 * (panel.start + panel.stop)) for panel, count in pairs if not count]
+        moving = [
+            half
+            for panel, middle in middles
+            for half in (panel._replace(stop=middle), panel._replace(start=middle))
+        ]
+        halvings += 1
+    chosen.sort(key=lambda item: item[0].start)
+    return Stations(*zip(*chosen, strict=True))
 
 
-def extreme(
-    panels: Sequence[Panel], quantity: Callable[[Panel, FloatArray], FloatArray]
-) -> tuple[float, float]:
-    """Return the greatest value of a quantity over a turn, and its angle [rad], the first if equal.
+def extremes(panels: Sequence[Panel], quantities: Quantity) -> list[tuple[float, float]]:
+    """Return the greatest value of quantities over a turn, and its angle [rad], the first if equal.
 
     Parameters
     ----------
     panels : sequence of Panel
-    quantity : callable
-        Its value at angles within a panel; not a number where it is not defined.
+    quantities : Quantity
+        Their values, shape (quantities, panels, points); not a number where one is not defined.
     """
-    best = -np.inf, 0.0
-    for panel in panels:
-        found, low, high, samples = (-np.inf, 0.0), panel.start, panel.stop, _SAMPLES
-        for _ in range(1 if panel.dwell else 1 + _REFINEMENTS):
-            angles = np.linspace(low, high, samples)
-            values = quantity(panel, angles)
-            values = np.where(np.isnan(values), -np.inf, values)
-            place = int(values.argmax())
-            if values[place] > found[0]:
-                found = float(values[place]), float(angles[place])
-            low, high = angles[max(place - 1, 0)], angles[min(place + 1, samples - 1)]
-            samples = _REFINED
-        if found[0] > best[0] and not math.isclose(found[0], best[0], rel_tol=_EQUAL):
-            best = found
-    return best
+    theta = np.stack([np.linspace(panel.start, panel.stop, _SAMPLES) for panel in panels])
+    values = quantities(panels, theta)
+    found = np.zeros((2, *values.shape[:2]))
+    found[0] = -np.inf
+    rows = list(np.ndindex(values.shape[:2]))  # quantity and panel of each row that is searched
+    theta, values = np.tile(theta, (len(values), 1)), values.reshape(len(rows), -1)
+    spans: dict[tuple[int, ...], tuple[float, float]] = {}
+    for refinement in range(1 + _REFINEMENTS):
+        if refinement:
+            rows = [(q, k) for q, k in rows if not panels[k].dwell]
+            if not rows:
+                break
+            theta = np.stack([np.linspace(*spans[row], _REFINED) for row in rows])
+            of_all = quantities([panels[k] for _, k in rows], theta)
+            values = of_all[[q for q, _ in rows], range(len(rows))]
+        values = np.where(np.isnan(values), -np.inf, values)
+        for row, numbers, angles in zip(rows, values, theta, strict=True):
+            place = int(numbers.argmax())
+            if numbers[place] > found[0][row]:
+                found[:, *row] = numbers[place], angles[place]
+            spans[row] = angles[max(place - 1, 0)], angles[min(place + 1, len(angles) - 1)]
+    greatest = []
+    for of_panels in found.transpose(1, 2, 0).tolist():
+        best, at = -np.inf, 0.0
+        for value, angle in of_panels:
+            if value > best and not math.isclose(value, best, rel_tol=_EQUAL):
+                best, at = value, angle
+        greatest.append((best, at))
+    return greatest
+
+
+def extreme(panels: Sequence[Panel], quantity: Quantity) -> tuple[float, float]:
+    """Return the greatest value of one quantity, shape (panels, points), as of `extremes`."""
+    return extremes(panels, lambda some, theta: quantity(some, theta)[None])[0]

@@ -8,8 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from wearsim.mechanics.cam import extreme
-from wearsim.studies.cam.turn import SHARP, STEEP, CamTurn
+from wearsim.studies.cam.turn import CamTurn
 
+STEEP = {"translating": math.radians(30.0), "swinging": math.radians(45.0)}
+SHARP = 2.0  # radius of the pitch curve over the roller's, below which the contact is warned
 FEWEST_SWEEPS = 10.0  # of the contact around the roller in a life, below which it wears unevenly
 
 _NEAR = 2.0  # ratio of the noise of a table to lift_tolerance

@@ -204,8 +204,9 @@ def study_cam(
 
 
 def peak_pressures(setup: Setup, point: Point) -> FloatArray:
-    """Return the peak pressure of the fresh contact after Hertz, shape (points,) [Pa]."""
-    return np.array([patch.peak_pressure for patch in setup.patches_at(point)])
+    """Return the peak pressure of the fresh contact after Hertz, shape as the angles [Pa]."""
+    pressures = [patch.peak_pressure for patch in setup.patches_at(point)]
+    return np.reshape(pressures, point.angle.shape)
 
 
 def _film(turn: CamTurn, point: Point) -> FloatArray | None:
@@ -238,10 +239,11 @@ def _jump_speed(turn: CamTurn) -> float | None:
     if load is None or cam.inertia == 0.0 or cam.groove:
         return None
 
-    def ratio(panel: Panel, theta: FloatArray) -> FloatArray:
-        lift = cam.motion.lift_in(panel.segment, theta)
-        static = load.preload + load.spring * lift[0] + load.external(theta)
-        return np.asarray(-cam.inertia * lift[2] / static)
+    def ratio(panels: Sequence[Panel], theta: FloatArray) -> FloatArray:
+        kinematics = turn.rolling(panels, theta)
+        external = load.external(theta) if load.external else 0.0
+        static = load.preload + load.spring * kinematics.lift + external
+        return np.asarray(-cam.inertia * kinematics.lift_per_rad2 / static)
 
     greatest, _ = extreme(turn.panels, ratio)
     return 1.0 / math.sqrt(greatest) if greatest > 0.0 else None

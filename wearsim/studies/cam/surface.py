@@ -107,8 +107,8 @@ class _Outlines:
     def _parts(self, inner: bool) -> Iterator[tuple[Points, float, float]]:
         """Yield the points of each panel at its angles, first unworn, then worn."""
         turn, first = self.turn, self.stations.first
-        for number, panel in enumerate(self.stations.panels):
-            touched = turn.is_inner(panel) == inner
+        touches = turn.is_inner(self.stations.panels) == inner
+        for number, (panel, touched) in enumerate(zip(self.stations.panels, touches, strict=True)):
             values = None
             if self.depth is not None:
                 begin, count = int(first[number]), self.stations.numbers[number]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -18,6 +18,7 @@ from wearsim.mechanics.cam import (
     Stations,
     choose_stations,
     extreme,
+    extremes,
     skid_arcs,
     surface_points,
 )
@@ -27,11 +28,10 @@ from wearsim.studies.cam.path import path_of
 from wearsim.studies.cam.point import Point
 from wearsim.types import BoolArray, FloatArray
 
-STEEP = {"translating": math.radians(30.0), "swinging": math.radians(45.0)}
-SHARP = 2.0  # radius of the pitch curve over the roller's, below which the contact is warned
 PART_OF_TOLERANCE = 0.25  # for the stations
 LEAST_LOAD = 1e-4  # of the greatest, where the flank of a groove changes
 _FINE = 1e-10  # tolerance of integrals over a turn
+_SIGNS = np.array([1.0, -1.0])[:, None, None]  # of values whose greatest and least are searched
 
 
 class CamTurn:
@@ -79,18 +79,21 @@ class CamTurn:
         return self._worn is not None
 
     def carried(self, point: Point) -> FloatArray:
-        """Return the normal force of the worn cam, not negative, at increasing angles [N]."""
+        """Return the normal force of the worn cam, not negative, at rows of rising angles [N]."""
         force = point.normal_force
         if self._worn is not None:
             stations, change = self._worn
-            force = force + stations.values_at_angles(change, point.angle)
+            rows = point.angle.reshape(-1, point.angle.shape[-1])
+            moved = [stations.values_at_angles(change, row) for row in rows]
+            force = force + np.reshape(moved, force.shape)
         return np.asarray(np.maximum(force, 0.0))
 
     def effort(self, lift: FloatArray | Sequence[FloatArray], theta: FloatArray) -> FloatArray:
         """Return the force [N] or torque [N m] on the follower, positive on the outer flank."""
         if self.load is None:
             raise ValueError("the load is not that of a follower")
-        static = self.load.preload + self.load.spring * lift[0] + self.load.external(theta)
+        external = self.load.external(theta) if self.load.external else 0.0
+        static = self.load.preload + self.load.spring * lift[0] + external
         return np.asarray(static + self.cam.inertia * self.speed**2 * lift[2])
 
     def point(self, lift: FloatArray, theta: FloatArray, inner: BoolArray | None = None) -> Point:
@@ -105,17 +108,14 @@ class CamTurn:
 
     def _loaded(self, kinematics: RollerKinematics, theta: FloatArray, inner: BoolArray) -> Point:
         """Return the state for a motion of the roller on the flanks `inner`."""
-        follower, lever = (
-            self.cam.follower,
-            self.cam.follower.lever * np.cos(kinematics.pressure_angle),
-        )
+        follower = self.cam.follower
+        lever = follower.lever * np.cos(kinematics.pressure_angle)
         if self.load is None:
-            force = np.full(len(theta), self._constant)
+            force = np.full(theta.shape, self._constant)
             effort, spring = force * follower.lever * np.cos(kinematics.pressure_angle), 0.0
         else:
-            effort = self.effort(
-                (kinematics.lift, kinematics.lift_per_rad, kinematics.lift_per_rad2), theta
-            )
+            lift = kinematics.lift, kinematics.lift_per_rad, kinematics.lift_per_rad2
+            effort = self.effort(lift, theta)
             force, spring = np.where(inner, -effort, effort) / lever, self.load.spring
             if self.cam.groove:  # it vanishes where the flank changes
                 force = np.maximum(force, LEAST_LOAD * self._greatest_effort / follower.lever)
@@ -123,25 +123,24 @@ class CamTurn:
             theta, kinematics, inner, force, effort * kinematics.lift_per_rad, spring / lever**2
         )
 
-    def at(self, panel: Panel, theta: FloatArray) -> Point:
-        """Return the state at angles within a panel [rad]."""
-        inner = self.is_inner(panel)
-        kinematics = self._path.at(panel.segment, theta, inner)
-        return self._loaded(kinematics, theta, np.full(len(theta), inner))
+    def at(self, panels: Sequence[Panel], theta: FloatArray) -> Point:
+        """Return the state at angles within panels, shape (panels, points) [rad]."""
+        inner = np.broadcast_to(self.is_inner(panels)[:, None], theta.shape)
+        return self._loaded(self.rolling(panels, theta), theta, inner)
 
-    def rolling(self, panel: Panel, theta: FloatArray) -> RollerKinematics:
-        """Return the motion of the roller at angles within a panel [rad]."""
-        return self._path.at(panel.segment, theta, self.is_inner(panel))
+    def rolling(self, panels: Sequence[Panel], theta: FloatArray) -> RollerKinematics:
+        """Return the motion of the roller at angles within panels, shape (panels, points) [rad]."""
+        return self._path.at(panels, theta, self.is_inner(panels)[:, None])
 
-    def is_inner(self, panel: Panel) -> bool:
-        """Return whether the roller touches the inner flank of a groove in a panel."""
+    def is_inner(self, panels: Sequence[Panel]) -> BoolArray:
+        """Return in which panels the roller touches the inner flank of a groove."""
         if self.load is None or not self.cam.groove:
-            return False
-        known = self._inner.get(panel)
-        if known is None:
-            middle = np.array([0.5 * (panel.start + panel.stop)])
-            known = self._inner[panel] = bool(self._effort_in(panel, middle)[0] < 0.0)
-        return known
+            return np.zeros(len(panels), dtype=bool)
+        for panel in panels:
+            if panel not in self._inner:
+                middle = np.array([0.5 * (panel.start + panel.stop)])
+                self._inner[panel] = bool(self._effort_in(panel, middle)[0] < 0.0)
+        return np.array([self._inner[panel] for panel in panels])
 
     @cached_property
     def _greatest_effort(self) -> float:
@@ -157,7 +156,7 @@ class CamTurn:
     @cached_property
     def panels(self) -> tuple[Panel, ...]:
         """Smooth parts of the turn, on each of which the roller touches one flank."""
-        steady = self.load is None or not self.load.has_external
+        steady = self.load is None or not self.load.external
         panels = [panel._replace(dwell=panel.dwell and steady) for panel in self.cam.motion.panels]
         return tuple(part for panel in panels for part in self._flanks(panel))
 
@@ -211,8 +210,8 @@ class CamTurn:
             return []
         scale = inertia * self.speed**2
 
-        def rolling(panel: Panel, theta: FloatArray) -> Rolling:
-            point = self.at(panel, theta)
+        def rolling(panels: Sequence[Panel], theta: FloatArray) -> Rolling:
+            point = self.at(panels, theta)
             kinematics, drag = point.kinematics, self.drag(point) / scale
             most = self._greatest_torque(point) / scale
             return Rolling(kinematics.spin, kinematics.spin_per_rad, drag, most)
@@ -230,9 +229,9 @@ class CamTurn:
             self.scenario.friction.coefficient * self.carried(point) * self.scenario.roller.radius
         )
 
-    def _demand(self, panel: Panel, theta: FloatArray) -> FloatArray:
+    def _demand(self, panels: Sequence[Panel], theta: FloatArray) -> FloatArray:
         """Return the traction of a rolling free roller, over the limit of friction."""
-        point = self.at(panel, theta)
+        point = self.at(panels, theta)
         return np.asarray(np.abs(self.torque(point)) / self._greatest_torque(point))
 
     @cached_property
@@ -259,17 +258,17 @@ class CamTurn:
 
         Parameters
         ----------
-        theta : ndarray, shape (points,)
+        theta : ndarray
             Angles [rad].
-        within : ndarray, shape (points,), optional
+        within : ndarray, shape of theta, optional
             Angles on the same side of an arc's end, by default `theta`.
 
         Returns
         -------
-        ndarray, shape (points,)
+        ndarray, shape of theta
             Not a number where the roller rolls.
         """
-        slips = np.full(len(theta), np.nan)
+        slips = np.full(theta.shape, np.nan)
         within = np.mod(theta, math.tau) if within is None else within
         for arc in self.arcs:
             inside = (within >= arc.theta[0]) & (within <= arc.theta[-1])
@@ -277,34 +276,47 @@ class CamTurn:
         return slips
 
     @cached_property
+    def _forces(self) -> list[tuple[float, float]]:
+        """Greatest and least normal force [N], the latter negated, each with its angle [rad]."""
+        return extremes(self.panels, lambda p, x: _SIGNS * self.at(p, x).normal_force)
+
+    @property
     def normal_range(self) -> tuple[float, float]:
         """Least and greatest normal force of the turn [N]."""
-        greatest, _ = extreme(self.panels, lambda p, x: self.at(p, x).normal_force)
-        return self._least_force[0], greatest
+        (greatest, _), (negated, _) = self._forces
+        return -negated, greatest
 
-    @cached_property
-    def _least_force(self) -> tuple[float, float]:
-        """Least normal force [N] and its angle [rad]."""
-        least, theta = extreme(self.panels, lambda p, x: -self.at(p, x).normal_force)
-        return -least, theta
+    @property
+    def _shape(self) -> list[tuple[float, float]]:
+        """Greatest undercut, curvature and negated curvature, each with its angle [rad].
+
+        They follow from the motion alone. The undercut is the curvature of the pitch curve times
+        the roller's radius, 1 at a cusp; the others are relative curvatures along rolling [1/m].
+        """
+
+        def values(panels: Sequence[Panel], theta: FloatArray) -> FloatArray:
+            kinematics = self.rolling(panels, theta)
+            side = np.where(self.is_inner(panels)[:, None], -1.0, 1.0)
+            undercut = side * kinematics.pitch_curvature * self.scenario.roller.radius
+            return np.stack([undercut, *(_SIGNS * kinematics.relative_curvature)])
+
+        return self._path.once(("shape", *self._sides), lambda: extremes(self.panels, values))
+
+    @property
+    def _greatest_radius(self) -> tuple[float, float]:
+        """Greatest `radius` [m] and its angle [rad]."""
+        return self._path.once(("radius", *self._sides), lambda: extreme(self.panels, self.radius))
 
     @property
     def _sides(self) -> tuple[tuple[Panel, bool], ...]:
         """Panels and whether the roller touches the inner flank, which decide its motion."""
-        return tuple((panel, self.is_inner(panel)) for panel in self.panels)
+        return tuple(zip(self.panels, self.is_inner(self.panels).tolist(), strict=True))
 
-    @cached_property
+    @property
     def curvatures(self) -> tuple[float, float]:
         """Least and greatest relative curvature along rolling [1/m]."""
-        greatest, _ = self._extreme("curvature", lambda p, x: self.rolling(p, x).relative_curvature)
-        least, _ = self._extreme("-curvature", lambda p, x: -self.rolling(p, x).relative_curvature)
-        return -least, greatest
-
-    def _extreme(
-        self, name: str, values: Callable[[Panel, FloatArray], FloatArray]
-    ) -> tuple[float, float]:
-        """Return the greatest of values of the motion alone, by name, and its angle [rad]."""
-        return self._path.once((name, *self._sides), lambda: extreme(self.panels, values))
+        _, (greatest, _), (negated, _) = self._shape
+        return -negated, greatest
 
     @cached_property
     def greatest_demand(self) -> float:
@@ -314,17 +326,15 @@ class CamTurn:
     @cached_property
     def greatest_skid(self) -> float:
         """Greatest creepage of a skid, 0 without any."""
-        sizes = [
-            np.abs(arc.slip / self.at_angles(arc.theta).kinematics.travel).max()
-            for arc in self.arcs
-        ]
+        pairs = ((arc.slip, self.at_angles(arc.theta).kinematics.travel) for arc in self.arcs)
+        sizes = [np.abs(slip / travel).max() for slip, travel in pairs]
         return self.scenario.roller.radius * float(max(sizes, default=0.0))
 
     def drag(self, point: Point) -> FloatArray:
         """Return the torque of the bearing, against the roller's rotation [N m]."""
         creepage = self.scenario.creepage
         arm = 0.5 * creepage.bearing_friction * (creepage.bearing_diameter or 0.0)
-        friction = arm * self.carried(point) if arm else np.zeros(len(point.angle))
+        friction = arm * self.carried(point) if arm else np.zeros(point.angle.shape)
         return np.asarray((creepage.bearing_torque or 0.0) + friction)
 
     def torque(self, point: Point) -> FloatArray:
@@ -344,16 +354,17 @@ class CamTurn:
         """Whether a run has more than one station."""
         return len(self.parts) > 1 or not (self.parts[0].dwell or self.cam.stations == 1)
 
-    def _represented(self, panel: Panel, theta: FloatArray) -> FloatArray:
+    def _represented(self, panels: Sequence[Panel], theta: FloatArray) -> FloatArray:
         """Return what the stations must represent: depth in full slip, N ds, traction and slip."""
-        point = self.at(panel, theta)
+        point = self.at(panels, theta)
         force, travel = np.maximum(point.normal_force, 0.0), point.kinematics.travel
         # in a groove the load vanishes, where a power is not smooth
         depth = force if self.cam.groove else force ** (2.0 / 3.0)
         rows = [depth, force * travel, travel]
         if self.free:
             most = np.maximum(self._greatest_torque(point), 1e-300)
-            slip = self.slip(theta, np.full(len(theta), 0.5 * (panel.start + panel.stop)))
+            middles = [[0.5 * (panel.start + panel.stop)] for panel in panels]
+            slip = self.slip(theta, np.broadcast_to(middles, theta.shape))
             demand = np.clip(self.torque(point) / most, -1.0, 1.0)
             rows += [np.where(np.isnan(slip), 1.0 + demand, 1.0), np.nan_to_num(slip)]
         return np.stack(rows)
@@ -365,16 +376,17 @@ class CamTurn:
         return self._path.once((quantity, *self._sides), lambda: self._integral(quantity))
 
     def _integral(self, quantity: str) -> float:
-        def values(panel: Panel, theta: FloatArray) -> FloatArray:
-            point = self.at(panel, theta)
-            factor = point.normal_force if quantity == "load" else 1.0
-            return np.asarray(factor * point.kinematics.travel)
+        loaded = quantity == "load"
 
-        fine = choose_stations(self.panels, lambda p, x: values(p, x)[None], _FINE)
-        parts = zip(fine.panels, fine.numbers, fine.first, strict=True)
-        return float(
-            sum(fine.weight[i : i + n] @ values(p, fine.angle[i : i + n]) for p, n, i in parts)
-        )
+        def values(panels: Sequence[Panel], theta: FloatArray) -> FloatArray:
+            travel = self.rolling(panels, theta).travel
+            return (self.at(panels, theta).normal_force * travel if loaded else travel)[None]
+
+        fine = choose_stations(self.panels, values, _FINE)
+        point = self.at_stations(fine)
+        along = point.kinematics.travel * (point.normal_force if loaded else 1.0)
+        parts = zip(fine.first, fine.numbers, strict=True)
+        return float(sum(fine.weight[i : i + n] @ along[i : i + n] for i, n in parts))
 
     @property
     def mean_radius(self) -> float:
@@ -393,12 +405,8 @@ class CamTurn:
     def at_stations(self, stations: Stations) -> Point:
         """Return the state at stations, at both sides of a boundary between segments."""
         segments = np.array([panel.segment for panel in stations.panels])[stations.panel]
-        flanks = np.array([self.is_inner(panel) for panel in stations.panels])
-        lift = np.empty((3, stations.count))
-        for number in np.unique(segments):
-            chosen = segments == number
-            lift[:, chosen] = self.cam.motion.lift_in(int(number), stations.angle[chosen])
-        return self.point(lift, stations.angle, flanks[stations.panel])
+        lift = self.cam.motion.lift_in(segments, stations.angle)
+        return self.point(lift, stations.angle, self.is_inner(stations.panels)[stations.panel])
 
     def checked(self) -> CamTurn:
         """Return the turn if the roller can follow it.
@@ -409,7 +417,7 @@ class CamTurn:
             If the cam is undercut, the follower jumps or the roller rolls nowhere.
         """
         mistakes, radius = [], self.scenario.roller.radius
-        sharpest, theta = self._extreme("undercut", self._undercut)
+        sharpest, theta = self._shape[0]
         if sharpest >= 1.0 - 1e-9:
             flank = "inner flank" if self.at_angles(np.array([theta])).inner[0] else "cam"
             mistake = Mistake(
@@ -422,13 +430,13 @@ class CamTurn:
             )
             mistakes.append(mistake)
         mistakes += self._reach_mistakes()
-        least, theta = self._least_force
-        if least <= 0.0 and not self.cam.groove:
+        negated, theta = self._forces[1]
+        if -negated <= 0.0 and not self.cam.groove:
             mistake = Mistake(
                 "load",
                 "preload",
                 "the follower jumps, since the normal force falls to zero or below",
-                f"{least:.4g} N at {self.place(theta)}",
+                f"{-negated:.4g} N at {self.place(theta)}",
                 "more than 0 N, by a greater preload or stiffness, or a smaller speed or mass",
             )
             mistakes.append(mistake)
@@ -447,13 +455,12 @@ class CamTurn:
         pivot of an arm from the cam [m].
         """
         radius, margins = self.scenario.roller.radius, {}
-        sharpest, _ = self._extreme("undercut", self._undercut)
+        sharpest, _ = self._shape[0]
         margins["undercut_margin"] = radius / sharpest - radius if sharpest > 0.0 else math.inf
         if not self.cam.groove:
             margins["least_normal_force"] = self.normal_range[0]
         if self.cam.follower.swings and not self.cam.groove:
-            greatest, _ = self._extreme("radius", self.radius)
-            margins["pivot_margin"] = self.cam.follower.centre_distance - greatest
+            margins["pivot_margin"] = self.cam.follower.centre_distance - self._greatest_radius[0]
         return margins
 
     def _reach_mistakes(self) -> list[Mistake]:
@@ -461,7 +468,7 @@ class CamTurn:
         follower = self.cam.follower
         if not follower.swings or self.cam.groove:
             return []
-        greatest, theta = self._extreme("radius", self.radius)
+        greatest, theta = self._greatest_radius
         if greatest < follower.centre_distance:
             return []
         got = f"{1e3 * greatest:.6g} mm at {self.place(theta)}"
@@ -469,17 +476,10 @@ class CamTurn:
         expected = f"less than {1e3 * follower.centre_distance:.6g} mm, follower.centre_distance"
         return [Mistake("cam", "base_radius", what, got, expected)]
 
-    def radius(self, panel: Panel, theta: FloatArray) -> FloatArray:
-        """Return the distance of the cam's surface from its axis at angles within a panel [m]."""
-        x, y = surface_points(self.cam.follower, self.rolling(panel, theta), theta)[1]
+    def radius(self, panels: Sequence[Panel], theta: FloatArray) -> FloatArray:
+        """Return the distance of the cam's surface from its axis at angles within panels [m]."""
+        x, y = surface_points(self.cam.follower, self.rolling(panels, theta), theta)[1]
         return np.asarray(np.hypot(x, y))
-
-    def _undercut(self, panel: Panel, theta: FloatArray) -> FloatArray:
-        """Return the curvature of the pitch curve times the roller's radius, 1 at a cusp."""
-        side = -1.0 if self.is_inner(panel) else 1.0
-        return np.asarray(
-            side * self.rolling(panel, theta).pitch_curvature * self.scenario.roller.radius
-        )
 
     def place(self, theta: float) -> str:
         """Return an angle and its segment in words."""

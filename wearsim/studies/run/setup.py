@@ -320,8 +320,8 @@ class Setup:
 
     def patches_at(self, point: Point) -> list[HertzContact]:
         """Return the patch of the unworn bodies at the points of a turn, with its load there."""
-        curvatures = point.kinematics.relative_curvature.tolist()
-        return list(map(self.fresh_patch, point.normal_force.tolist(), curvatures))
+        curvatures = point.kinematics.relative_curvature.ravel().tolist()
+        return list(map(self.fresh_patch, point.normal_force.ravel().tolist(), curvatures))
 
     def hardest_patch(self, load: float) -> tuple[HertzContact, float]:
         """Return the patch of the greatest peak pressure and its load [N].
