@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 from wearsim.types import Material
 
@@ -45,6 +46,7 @@ class ElasticPair:
         )
 
 
+@lru_cache  # asked for by the scenario and by each contact model
 def combine(first: Material, second: Material) -> ElasticPair:
     """Return the combined constants of two bodies (eq. 6 of DOI 10.1016/j.wear.2004.11.012).
 
