@@ -115,11 +115,11 @@ class Motion:
     def lift_in(self, segments: int | IntArray, theta: FloatArray) -> FloatArray:
         """Return lift and derivatives, shape (3, ...), at angles [rad] within segments by number.
 
-        Both arrays broadcast to the shape of the angles.
+        The segments broadcast to the shape of the angles.
         """
-        segments, lift = np.broadcast_to(segments, theta.shape), np.empty((3, *theta.shape))
+        lift = np.empty((3, *theta.shape))
         for number in np.unique(segments).tolist():
-            part, chosen = self.segments[number], segments == number
+            part, chosen = self.segments[number], np.broadcast_to(segments == number, theta.shape)
             inside = np.clip(theta[chosen] - self.starts[number], 0.0, part.angle)
             lift[:, chosen] = part.lift(inside)
             lift[0, chosen] += self.bases[number]

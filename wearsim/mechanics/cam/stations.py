@@ -138,6 +138,8 @@ class Stations:
         for panel, number, first in zip(self.panels, self.numbers, self.first, strict=True):
             low, high = np.searchsorted(angles, (panel.start, panel.stop)).tolist()
             high = len(angles) if panel is self.panels[-1] else high
+            if low == high:
+                continue
             places = (angles[low:high] - panel.start) / (panel.stop - panel.start)
             matrix = interpolation(number, np.clip(places, 0.0, 1.0))
             interpolated[low:high] = np.tensordot(matrix, values[first : first + number], axes=1)

@@ -184,8 +184,7 @@ class Setup:
         ScenarioError
             If the load is not defined for the whole test, or not positive.
         """
-        offset = self.range_of("normal_force_offset")[1]
-        return self.load_range()[1] + offset
+        return self.range_of("normal_force_offset")[1] + self.load_range()[1]
 
     def load_range(self, stop: float | None = None) -> tuple[float, float]:
         """Return the least and greatest load up to `stop` [s], before any feedback [N].
@@ -202,7 +201,7 @@ class Setup:
         if isinstance(load, FollowerLoad):
             low, high = turn_of(scenario).normal_range
             return (low if low > 0.0 else high), high  # where N changes sign, the flank changes
-        span = None if load.constant else load.span
+        span = None if load.constant else load.span  # a constant load is known at all times
         if span is not None and (span[0] > 0.0 or span[1] < stop * (1.0 - 1e-9)):
             raise load_mistake(
                 scenario,
