@@ -16,12 +16,14 @@ from tests.evolution.test_step_loads import Line, with_loads
 from wearsim.evolution.error_estimates import volume_of
 from wearsim.evolution.quantities import oscillation
 from wearsim.evolution.state import fresh_state
+from wearsim.evolution.steppers import edges
 from wearsim.evolution.steppers.base import GROW, Attempt
 from wearsim.evolution.steppers.damage import damage_excess, with_damage
 from wearsim.evolution.steppers.forward_euler import OSCILLATING, ExplicitStepper, stability_limit
 from wearsim.evolution.steppers.implicit import (
     OF_STEPS,
     ImplicitStepper,
+    with_rates,
 )
 from wearsim.evolution.steppers.per_pass import PerPassStepper, run_passes
 from wearsim.evolution.steppers.single_step import explicit_step
@@ -192,7 +194,9 @@ def test_alternating_line_load_gives_a_warning_except_next_to_a_pause(rig):
 def test_steps_aim_at_less_where_errors_have_added_up(rig):
     tolerance, stop, (low, high) = 1e-3, 1e6, ADDED_UP
     problem = rig.problem.at(np.zeros(5, dtype=np.int64))
-    state = fresh_state(problem).replaced(passes=np.array([1e6, 1e6, 2.5e5, 2.5e5, 1e6]))
+    state = with_rates(problem, fresh_state(problem)).replaced(
+        passes=np.array([1e6, 1e6, 2.5e5, 2.5e5, 1e6])
+    )
     groove = 1e-6 * np.maximum(1.0 - (problem.grid.y / 2e-3) ** 2, 0.0)
     worn = state.replaced(cylinder_depth=groove * np.array([[1.0]] * 4 + [[0.0]])[None, None])
     middle = 0.5 * (low + high) * tolerance
@@ -207,6 +211,11 @@ def test_steps_aim_at_less_where_errors_have_added_up(rig):
     )
     found = ImplicitStepper(tolerance)._left(problem, worn, stop, OF_STEPS, worn.irreducible)
     np.testing.assert_allclose(found, [0.5, LEAST_AIM, 0.5, 0.5, 1.0], rtol=1e-9)
+    # where edges are resolved, the error of the profile decays
+    cut = edges.without_edges(problem, worn)
+    cut = cut.replaced(**dict.fromkeys(edges.FIELDS, np.zeros_like(worn.cylinder_depth)))
+    found = ImplicitStepper(tolerance)._left(problem, cut, stop, OF_STEPS, worn.irreducible)
+    np.testing.assert_allclose(found, [0.5, 1.0, 0.5, 1.0, 1.0], rtol=1e-9)
     young = worn.replaced(profile_error=np.full(5, 0.49 * low * tolerance))
     assert (ImplicitStepper(tolerance)._left(problem, young, stop, OF_STEPS, fixed) == 1.0).all()
     errors = {"profile_error": np.array([0.45 * tolerance]), "volume_error": of_volume[:1]}

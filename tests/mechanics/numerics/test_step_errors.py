@@ -1,6 +1,6 @@
 """Errors of an implicit step, interpreted, against plain formulas for each test.
 
-A cylinder and a roller wear in two tests, of which the first one resolves edges within a strip.
+A cylinder or a cam wears with a roller in two tests; the first one resolves edges within a strip.
 """
 
 from __future__ import annotations
@@ -15,13 +15,17 @@ from wearsim.mechanics.numerics.implicit_step import WHOLE_PASSES
 from wearsim.mechanics.numerics.linearised_wear import carried_errors
 from wearsim.mechanics.numerics.multistep import MAX_ORDER, ROWS, next_steps
 from wearsim.mechanics.numerics.step_errors import (
+    BESIDE_YOUNG,
     COVER,
     EDGE_ORDER,
     EDGES,
+    EDGES_EXPONENT,
     KEEP,
     LEAST_ENERGY,
     OF_EDGES,
     OF_VOLUME,
+    OF_YOUNG,
+    PART_EXPONENT,
     SHARE,
     YOUNG,
     assess_step,
@@ -29,37 +33,40 @@ from wearsim.mechanics.numerics.step_errors import (
 )
 
 TESTS, STRIPS, SIZE = 2, 7, 1e-6
-BODIES, SHAPE = np.array([[0, 1]]), (2, TESTS, STRIPS)
 
 
 class Step:
-    """A step of two tests, with random errors and past points."""
+    """A step of two tests, with random errors and past points, on a cylinder or a cam."""
 
-    def __init__(self) -> None:
+    def __init__(self, stations: int = 1) -> None:
         rng = np.random.default_rng(4)
+        self.bodies = np.array([[station, stations] for station in range(stations)])
+        self.shape, contacts = (stations + 1, TESTS, STRIPS), stations * TESTS
         self.orders = np.array([2, 3])
         self.spans = np.cumsum(10.0 + 90.0 * rng.random((ROWS - 1, TESTS)), axis=0)
-        self.past = SIZE * 1e-3 * rng.standard_normal((ROWS, *SHAPE))
+        self.past = SIZE * 1e-3 * rng.standard_normal((ROWS, *self.shape))
         self.past[2:] *= 0.01
         self.past[0] = np.abs(self.past[0])
         self.past[0, :, :, 0] = 0.0
-        self.sums = SIZE * 1e-6 * rng.standard_normal((ROWS, *SHAPE[:2], 1))
-        self.part = np.where(rng.random((TESTS, STRIPS)) < 0.4, rng.random((TESTS, STRIPS)), 1.0)
-        self.part[0, :2], self.part[1] = [0.0, 0.6], np.nan
-        self.whole_steps = np.floor(9.0 * rng.random((TESTS, STRIPS)))
-        self.depths = SIZE * (1.0 + rng.random(SHAPE))
-        self.stepping = 1e-4 * SIZE * rng.standard_normal(SHAPE)
-        self.gap = SIZE * rng.random((TESTS, STRIPS))
-        self.loads = 1e5 * rng.random((TESTS, STRIPS))
-        self.exponents = 1.0 + rng.random((TESTS, STRIPS))
-        self.wear = 1e-3 * SIZE * rng.random((2, TESTS, STRIPS))
-        self.approach, self.stiffness = SIZE * np.array([3.0, 4.0]), np.array([0.0, 1e7])
+        self.sums = SIZE * 1e-6 * rng.standard_normal((ROWS, *self.shape[:2], 1))
+        strips = contacts, STRIPS
+        self.part = np.where(rng.random(strips) < 0.4, rng.random(strips), 1.0)
+        self.part[::TESTS, :2], self.part[1::TESTS] = [0.0, 0.6], np.nan
+        self.whole_steps = np.floor(9.0 * rng.random(strips))
+        self.depths = SIZE * (1.0 + rng.random(self.shape))
+        self.stepping = 1e-4 * SIZE * rng.standard_normal(self.shape)
+        self.gap = SIZE * rng.random(strips)
+        self.loads = 1e5 * rng.random(strips)
+        self.exponents = 1.0 + rng.random(strips)
+        self.wear = 1e-3 * SIZE * rng.random((2, *strips))
+        self.approach = np.tile(SIZE * np.array([3.0, 4.0]), stations)
+        self.stiffness = np.tile([0.0, 1e7], stations)
         self.displaced = SIZE * np.array([0.0, 0.02])
         self.volume_error = 1e-9 * SIZE * np.array([2.0, 3.0])
         self.irreducible = SIZE * np.array([[0.01, 0.02], [1e-9, 2e-9], [1e2, 3e2]])
-        self.weights = np.array([[1.0, 0.5], [1e-6, 3e-7]])
+        self.weights = np.array([[1.0] * stations + [0.5], [1e-6] * stations + [3e-7]])
         self.passes = np.array([2.0 * WHOLE_PASSES, 0.5 * WHOLE_PASSES])
-        self.scale, self.left = np.array([1.0, 3.0]), np.array([1.0, 0.4])
+        self.done, self.left = np.array([0.2, 0.6]), np.array([1.0, 0.4])
         self.begun, self.energy = np.array([300.0, 500.0]), np.array([4.0, 5.0])
         self.spent = np.array([1e-3, 0.02])  # in the step
         self.resolved = np.array([True, False])
@@ -67,10 +74,10 @@ class Step:
     def assess(self):
         of_next, orders, estimates = np.empty((2, TESTS)), self.orders.copy(), np.empty((3, TESTS))
         errors = assess_step(
-            1e-3, self.left, self.scale, self.passes, self.begun, self.begun + self.passes,
+            1e-3, self.left, self.done, self.passes, self.begun, self.begun + self.passes,
             self.energy, self.energy + self.spent, self.displaced, self.volume_error,
             self.irreducible, self.stepping, self.depths, self.orders, self.spans, self.past,
-            self.sums, self.part, self.whole_steps, BODIES, self.gap, self.approach,
+            self.sums, self.part, self.whole_steps, self.bodies, self.gap, self.approach,
             self.loads, self.wear.copy(), self.exponents, self.stiffness, 1e-4, self.weights,
             of_next, orders, estimates,
         )  # fmt: skip
@@ -88,8 +95,8 @@ def error_of_sum(step: Step, b: int, v: int) -> float:
 @pytest.mark.parametrize("resolved", [[True, False], [True, True]])
 def test_errors_of_strips_add_up_to_that_of_the_sum(resolved: list[bool]) -> None:
     step, rng = Step(), np.random.default_rng(5)
-    errors, parts = SIZE * rng.standard_normal(SHAPE), rng.random(SHAPE)
-    crossed = rng.random(SHAPE) < 0.3
+    errors, parts = SIZE * rng.standard_normal(step.shape), rng.random(step.shape)
+    crossed = rng.random(step.shape) < 0.3
     parts[1, 0] = np.where(crossed[1, 0], parts[1, 0], 0.0)  # nothing that could be shifted
     arguments = crossed, np.array(resolved), step.sums, step.spans, step.orders
     found = with_sum(errors, parts, *arguments)
@@ -113,7 +120,7 @@ def test_errors_of_strips_add_up_to_that_of_the_sum(resolved: list[bool]) -> Non
 def test_sum_without_past_points_has_no_error() -> None:
     step = Step()
     step.spans[1:] = np.inf
-    errors, parts, none = np.zeros(SHAPE), np.ones(SHAPE), np.zeros(SHAPE, bool)
+    errors, parts, none = np.zeros(step.shape), np.ones(step.shape), np.zeros(step.shape, bool)
     orders = np.ones(TESTS, np.int64)
     resolved = np.ones(TESTS, bool)
     found = with_sum(errors, parts, none, resolved, step.sums, step.spans, orders)
@@ -122,18 +129,26 @@ def test_sum_without_past_points_has_no_error() -> None:
 
 @pytest.mark.parametrize("of_energy", [1e-12, 1e3])
 @pytest.mark.parametrize("points", [2, 3, ROWS])
-def test_estimates_cover_errors_of_steps_edges_and_sums(points: int, of_energy: float) -> None:
-    step = Step()
+@pytest.mark.parametrize("stations", [1, 2])
+def test_estimates_cover_errors_of_steps_edges_and_sums(
+    stations: int, points: int, of_energy: float
+) -> None:
+    step = Step(stations)
+    shape = step.shape
     step.sums[2:, -1] *= of_energy / SIZE
     step.spans[points - 1 :] = np.inf  # missing past points
-    young, crossed = np.empty(SHAPE, bool), np.empty(SHAPE, bool)
-    parts, own, orders = np.empty(SHAPE), np.empty(SHAPE), np.empty(TESTS, np.int64)
+    young, crossed = np.empty(shape, bool), np.empty(shape, bool)
+    parts, own, orders = np.empty(shape), np.empty(shape), np.empty(TESTS, np.int64)
     state = step.part, step.whole_steps, step.orders, step.past[0]
-    mark_strips(BODIES, step.resolved, *state, young, crossed, parts)
-    assert young[:, 0].any()
+    mark_strips(step.bodies, step.resolved, *state, young, crossed, parts)
+    # the wear of a roller that meets several stations is of one order in all strips
+    assert young[:, 0].any() == (stations == 1)
+    assert crossed[:, 0].any()
     parts[young] *= YOUNG
     most = np.array([EDGE_ORDER, MAX_ORDER])
-    arguments = step.scale, SHARE * 1e-3, KEEP, most, parts, own, orders
+    scale = step.done ** np.array([EDGES_EXPONENT, PART_EXPONENT]) / step.left
+    scale[0] /= BESIDE_YOUNG if stations == 1 else 1.0
+    arguments = scale, SHARE * 1e-3, KEEP, most, parts, own, orders
     expected = next_steps(step.past, step.spans, step.depths, step.orders, *arguments)
     expected[0] *= step.left
     energy, by_energy = step.sums[:, -1:].copy(), np.empty(TESTS, np.int64)
@@ -149,10 +164,10 @@ def test_estimates_cover_errors_of_steps_edges_and_sums(points: int, of_energy: 
     expected = np.maximum(over, expected[0]), np.minimum(ratio, expected[1])
     own[:, 1] *= 2.0  # less than a whole pass
     added = with_sum(own, parts, crossed, step.resolved, step.sums, step.spans, step.orders)
-    worn = step.wear * step.passes[:, None]
+    worn = step.wear * np.tile(step.passes, stations)[:, None]
     carried, sizes = carried_errors(
         step.stepping, added, step.loads, worn, step.exponents, step.approach, step.gap,
-        step.depths, BODIES, step.stiffness, 1e-4, step.weights,
+        step.depths, step.bodies, step.stiffness, 1e-4, step.weights,
     )  # fmt: skip
     found, next_orders, errors, estimates = step.assess()
     np.testing.assert_allclose(found, expected, rtol=1e-12)
@@ -171,7 +186,8 @@ def test_estimates_cover_errors_of_steps_edges_and_sums(points: int, of_energy: 
             at_edge += np.where(young[:, v] & (step.past[0, :, v] > 0.0), first_order, 0.0)
             edges = EDGES * np.linalg.norm(at_edge) / np.linalg.norm(step.depths[:, v])
             profile = math.hypot(profile, edges)
-            depth, volume = OF_EDGES * depth, OF_EDGES * volume
+            cover = OF_EDGES * (OF_YOUNG if stations == 1 else 1.0)
+            depth, volume = cover * depth, cover * volume
         least = step.irreducible[:, v]
         volume = COVER[1] * volume + step.volume_error[v]
         relative = volume / (step.weights[1] @ step.depths[:, v].sum(axis=1))

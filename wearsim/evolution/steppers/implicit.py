@@ -35,14 +35,20 @@ from wearsim.evolution.steppers.single_step import (
 )
 from wearsim.evolution.steppers.step_doubling import StepDoublingStepper
 from wearsim.mechanics.numerics.multistep import MAX_ORDER, ROWS, first_differences, next_steps
-from wearsim.mechanics.numerics.step_errors import COVER, KEEP, SHARE, assess_step, parts_of_aim
+from wearsim.mechanics.numerics.step_errors import (
+    COVER,
+    KEEP,
+    PART_EXPONENT,
+    SHARE,
+    assess_step,
+    parts_of_aim,
+)
 from wearsim.types import FloatArray, IntArray
 
 DOUBLED_SHARE = 0.7  # part of the tolerance that a step may add to the profiles, by step doubling
 # least relative error of the energy that step doubling aims at: where the power changes by jumps, a
 # smaller one asks for ever shorter steps
 LEAST_OF_JUMPS = 1e-4
-PART_EXPONENT = 0.25  # early errors decay: they may be greater, by this power of the passes done
 # factors of volume and profile in the errors that steps aim at; step doubling sums absolute changes
 # of the volume, which do not add up
 OF_STEPS, DOUBLED = (1.0, COVER[2]), (math.inf, COVER_OF_DOUBLING)
@@ -110,20 +116,20 @@ class ImplicitStepper(StepDoublingStepper):
         passes = np.where(step == stop - state.passes, stop, end.passes)
         fixed = state.irreducible
         left = self._left(problem, state, stop, OF_STEPS, fixed)
-        scale, contacts, past = (passes / stop) ** PART_EXPONENT / left, end.contacts, end.past
+        done, contacts, past = passes / stop, end.contacts, end.past
         assert state.stepping_error is not None
         assert end.wear_exponents is not None
         assert end.order is not None
         displaced = np.zeros(step.size)
         if problem.has_spring:
-            aim = SHARE * self.tolerance
+            aim, scale = SHARE * self.tolerance, done**PART_EXPONENT / left
             of_loads, their_order, displaced = next_steps_of_loads(problem, end, scale, aim, KEEP)
         work, order = np.empty((5, step.size)), np.empty(step.size, np.int64)
         of_next, estimates = work[:2], work[2:]
         errors = assess_step(
             self.tolerance,
             left,
-            scale,
+            done,
             step,
             state.passes,
             end.passes,
@@ -234,6 +240,8 @@ class ImplicitStepper(StepDoublingStepper):
             state.profile_error,
             fixed,
             state.stacked,
+            state.past.separation,
+            state.past.part,
             problem.volume_weights,
         )
 

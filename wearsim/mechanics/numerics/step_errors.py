@@ -17,6 +17,9 @@ from wearsim.mechanics.numerics.multistep import MAX_ORDER, ROWS, next_steps
 from wearsim.types import BoolArray, FloatArray, IntArray
 
 SHARE = 0.35  # part of the tolerance that a step may add to the profiles
+# early errors decay: they may be greater, by this power of the passes done, and by the other one
+# where edges are resolved
+PART_EXPONENT, EDGES_EXPONENT = 0.25, 0.75
 COVER = (4.0, 2.0, 6.0)  # safety factors on the errors of depth, volume, profile
 # least errors of depth and profile, over that of the volume, all relative and with their factors: a
 # groove of wrong volume has the wrong depth and width, which further wear does not correct
@@ -25,11 +28,15 @@ OF_VOLUME = (0.33, 0.5)
 # less smooth after a change of order; where inputs vary they are not smooth at any order
 KEEP = 0.9
 # safety factors on local errors of strips that the edge crosses, and on errors of depth and volume
-EDGES, OF_EDGES = 8.0, 3.0
+# where edges are resolved; a further one where errors of young strips are discounted
+EDGES, OF_EDGES, OF_YOUNG = 8.0, 1.5, 6.0
 # greatest order where edges are resolved within a strip: beyond the first derivative the wear of
 # strips that the edge has just crossed is not smooth, and pressures would overshoot
 EDGE_ORDER = 3
-YOUNG = 0.2  # part of the difference in young strips that counts as error of a step
+# part of the difference in young strips that counts as error of a step: they are not smooth enough
+# for an estimate, which is too great; and part of the usual error that a step aims at then, as the
+# pressure at the edges follows from the wear of these strips
+YOUNG, BESIDE_YOUNG = 0.2, 1.0 / 3.0
 # lower bounds: the depth grows with a power of 2/3 to 1 of the passes, the volume with about 1
 DEPTH_EXPONENT, VOLUME_EXPONENT = 0.5, 0.75
 # the error that a step aims at falls where the errors so far, over the tolerance, exceed the first
@@ -134,7 +141,7 @@ def energy_steps(
 def assess_step(
     tolerance: float,
     left: FloatArray,
-    scale: FloatArray,
+    done: FloatArray,
     passes: FloatArray,
     passes_before: FloatArray,
     passes_after: FloatArray,
@@ -171,8 +178,8 @@ def assess_step(
     tolerance : float
     left : ndarray, shape (realisations,)
         From `parts_of_aim`, for the errors before the step.
-    scale : ndarray, shape (realisations,)
-        Part of the error that the step should add is one over this.
+    done : ndarray, shape (realisations,)
+        Passes done after the step over those of the test.
     passes : ndarray, shape (realisations,)
         Length of the step.
     passes_before, passes_after, energy_before, energy_after
@@ -215,13 +222,17 @@ def assess_step(
     young, crossed = np.empty(depths.shape, np.bool_), np.empty(depths.shape, np.bool_)
     parts, own = np.empty(depths.shape), np.empty(depths.shape)
     mark_strips(bodies, resolved, part, whole_steps, orders, past_wear[0], young, crossed, parts)
-    for b in range(rows):
-        for v in range(realisations):
-            most[v] = EDGE_ORDER if resolved[v] else MAX_ORDER
-            # young strips are not smooth enough for an estimate, which is too great
+    scale, discounted = np.empty(realisations), np.empty(realisations, np.bool_)
+    for v in range(realisations):
+        discounted[v] = False
+        for b in range(rows):
             for i in range(n):
                 if young[b, v, i]:
                     parts[b, v, i] *= YOUNG
+                    discounted[v] = True
+        most[v] = EDGE_ORDER if resolved[v] else MAX_ORDER
+        aim = left[v] * (BESIDE_YOUNG if discounted[v] else 1.0)
+        scale[v] = done[v] ** (EDGES_EXPONENT if resolved[v] else PART_EXPONENT) / aim
     by_depths = next_steps(
         past_wear,
         spans,
@@ -300,7 +311,8 @@ def assess_step(
         if resolved[v]:
             part_of_edges = math.sqrt(of_edges / square) if square > 0.0 else 0.0
             sizes[2, v] = math.hypot(sizes[2, v], part_of_edges)
-            sizes[0, v], sizes[1, v] = OF_EDGES * sizes[0, v], OF_EDGES * sizes[1, v]
+            cover = OF_EDGES * OF_YOUNG if discounted[v] else OF_EDGES
+            sizes[0, v], sizes[1, v] = cover * sizes[0, v], cover * sizes[1, v]
         # the error of the volume may cross zero
         of_test = COVER[1] * sizes[1, v] + volume_error[v]
         relative_size = of_test / volume if volume > 0.0 else 0.0
@@ -322,11 +334,16 @@ def parts_of_aim(
     profile_error: FloatArray,
     irreducible: FloatArray,
     depths: FloatArray,
+    separation: FloatArray,
+    part: FloatArray,
     volume_weights: FloatArray,
 ) -> FloatArray:
     """Return the part of its usual error that a step aims at, by the errors before it.
 
-    Errors of the volume add up during a test if they have the same sign.
+    Errors of the volume add up during a test if they have the same sign. Where edges are resolved,
+    the error of the profile is that of the strips that an edge has just crossed. It decays as these
+    are worn further, and depends on where within a strip the edge is at the end of a step: step
+    lengths that followed it would alternate between long and short.
 
     Parameters
     ----------
@@ -337,8 +354,8 @@ def parts_of_aim(
         Safety factors that the errors contain.
     volume_error, profile_error : ndarray, shape (realisations,)
         Before the step [m^3], and relative.
-    irreducible, depths, volume_weights
-        As of `assess_step`, before the step.
+    irreducible, depths, separation, part, volume_weights
+        As of `assess_step` and `begin_step`, before the step.
 
     Returns
     -------
@@ -346,7 +363,8 @@ def parts_of_aim(
     """
     bodies, realisations, n = depths.shape
     low, high = ADDED_UP
-    parts = np.ones(realisations)
+    parts, resolved = np.ones(realisations), np.empty(realisations, np.bool_)
+    fill_resolved(separation, part, resolved)
     for v in range(realisations):
         # `assess_step` makes the error of the profile at least this part of that of the volume
         if profile_error[v] < OF_VOLUME[1] * low * tolerance:
@@ -360,6 +378,7 @@ def parts_of_aim(
         if volume > 0.0:
             relative_size = (volume_error[v] - irreducible[1, v]) / of_volume / volume
             profile = (profile_error[v] - irreducible[2, v]) / of_profile
+            profile = 0.0 if resolved[v] else profile
             relative_size *= done[v] ** VOLUME_EXPONENT
             worst = max(relative_size, profile * done[v] ** DEPTH_EXPONENT) / tolerance
             parts[v] = min(max((high - worst) / (high - low), LEAST_AIM), 1.0)
@@ -376,7 +395,7 @@ def compile_step_errors() -> None:
         *(spans, past, sums, strip, strip, np.array([[0, 1]]), strip, one, strip, wear, strip),
         *(one, 1.0, np.ones((2, 2)), rows[:, 0], order, errors),
     )
-    parts_of_aim(1e-3, one, 1.0, 1.0, one, one, errors, rows, np.ones((2, 2)))
+    parts_of_aim(1e-3, one, 1.0, 1.0, one, one, errors, rows, strip, strip, np.ones((2, 2)))
     compile_implicit_step()
 
 
