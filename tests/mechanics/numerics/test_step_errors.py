@@ -22,7 +22,6 @@ from wearsim.mechanics.numerics.step_errors import (
     EDGES_EXPONENT,
     KEEP,
     LEAST_ENERGY,
-    OF_EDGES,
     OF_VOLUME,
     OF_YOUNG,
     PART_EXPONENT,
@@ -186,7 +185,7 @@ def test_estimates_cover_errors_of_steps_edges_and_sums(
             at_edge += np.where(young[:, v] & (step.past[0, :, v] > 0.0), first_order, 0.0)
             edges = EDGES * np.linalg.norm(at_edge) / np.linalg.norm(step.depths[:, v])
             profile = math.hypot(profile, edges)
-            cover = OF_EDGES * (OF_YOUNG if stations == 1 else 1.0)
+            cover = OF_YOUNG if stations == 1 else 1.0
             depth, volume = cover * depth, cover * volume
         least = step.irreducible[:, v]
         volume = COVER[1] * volume + step.volume_error[v]

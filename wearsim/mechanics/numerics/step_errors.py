@@ -27,16 +27,15 @@ OF_VOLUME = (0.33, 0.5)
 # of a step at a lower order, compared with other orders: the differences that a step leaves are
 # less smooth after a change of order; where inputs vary they are not smooth at any order
 KEEP = 0.9
-# safety factors on local errors of strips that the edge crosses, and on errors of depth and volume
-# where edges are resolved; a further one where errors of young strips are discounted
-EDGES, OF_EDGES, OF_YOUNG = 8.0, 1.5, 6.0
+# safety factor on local errors of strips that the edge crosses
+EDGES = 8.0
 # greatest order where edges are resolved within a strip: beyond the first derivative the wear of
 # strips that the edge has just crossed is not smooth, and pressures would overshoot
 EDGE_ORDER = 3
 # part of the difference in young strips that counts as error of a step: they are not smooth enough
-# for an estimate, which is too great; and part of the usual error that a step aims at then, as the
-# pressure at the edges follows from the wear of these strips
-YOUNG, BESIDE_YOUNG = 0.2, 1.0 / 3.0
+# for an estimate, which is too great; safety factor on errors of depth and volume then, and part of
+# the usual error that a step aims at, as the pressure at the edges follows from these strips
+YOUNG, OF_YOUNG, BESIDE_YOUNG = 0.2, 9.0, 1.0 / 3.0
 # lower bounds: the depth grows with a power of 2/3 to 1 of the passes, the volume with about 1
 DEPTH_EXPONENT, VOLUME_EXPONENT = 0.5, 0.75
 # the error that a step aims at falls where the errors so far, over the tolerance, exceed the first
@@ -311,8 +310,8 @@ def assess_step(
         if resolved[v]:
             part_of_edges = math.sqrt(of_edges / square) if square > 0.0 else 0.0
             sizes[2, v] = math.hypot(sizes[2, v], part_of_edges)
-            cover = OF_EDGES * OF_YOUNG if discounted[v] else OF_EDGES
-            sizes[0, v], sizes[1, v] = cover * sizes[0, v], cover * sizes[1, v]
+        if discounted[v]:
+            sizes[0, v], sizes[1, v] = OF_YOUNG * sizes[0, v], OF_YOUNG * sizes[1, v]
         # the error of the volume may cross zero
         of_test = COVER[1] * sizes[1, v] + volume_error[v]
         relative_size = of_test / volume if volume > 0.0 else 0.0
