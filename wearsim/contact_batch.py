@@ -274,9 +274,9 @@ class ContactBatchSolution:
 
     def joined_with(self, *others: ContactBatchSolution, rows: int) -> ContactBatchSolution:
         """Return these solutions joined with others row by row, all divided into equal `rows`."""
-        every = all(part.separation is not None for part in (self, *others))
-        joined, fields = {}, [vars(part) for part in (self, *others)]
-        for name in (*_OUTPUTS, "separation") if every else _OUTPUTS:
+        joined, fields = {}, [part.__dict__ for part in (self, *others)]
+        apart = [values["separation"] is not None for values in fields]
+        for name in (*_OUTPUTS, "separation") if all(apart) else _OUTPUTS:
             columns = [values[name] for values in fields]
             if rows > 1:
                 columns = [column.reshape(rows, -1, *column.shape[1:]) for column in columns]

@@ -23,7 +23,9 @@ def computed_once(compute: Callable[[WearProblem], T], problem: WearProblem) -> 
 
     It is computed at the first call, and kept with the problem.
     """
-    constants: dict[Callable[[WearProblem], T], T] = problem.__dict__.setdefault("constants", {})
+    if "constants" not in problem.__dict__:
+        problem.__dict__["constants"] = {}
+    constants: dict[Callable[[WearProblem], T], T] = problem.__dict__["constants"]
     if compute not in constants:
         constants[compute] = compute(problem)
     return constants[compute]

@@ -274,10 +274,11 @@ class Evolution:
         numbers, lengths = self.numbers.tolist(), []
         if not self._trials.keys() >= set(numbers):
             self._scheme = self.stepper.scheme(self.problem, self.state)
+            forced = self.stepper.forced_step is not None
             for number, length in zip(
                 numbers, self.stepper.proposed(self.problem, self.state).tolist(), strict=True
             ):
-                self._trials.setdefault(number, self.stepper.trial(length))
+                self._trials.setdefault(number, Trial(length, forced, self.stepper.taper))
         failures: dict[int, Exception] = {}
         done, count = self.state.passes.tolist(), self.numbers.size
         stops, resting = [self.stop] * count, [False] * count

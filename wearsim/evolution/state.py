@@ -365,19 +365,17 @@ def joined_states(states: Sequence[WearState]) -> WearState:
     first = states[0]
     if len(states) == 1:
         return first
-    fields, contacts = [vars(state) for state in states], [state.contacts for state in states]
+    fields, contacts = [state.__dict__ for state in states], [state.contacts for state in states]
     arrays = {
-        name: [values[name] for values in fields]
-        for name in _AXES
-        if getattr(first, name) is not None
+        name: [values[name] for values in fields] for name in _AXES if fields[0][name] is not None
     }
     rows = len(first.contacts) // len(first.passes)
     # the coarse-step solution of a test begins as the test itself
     coarse = [state.coarse_step_solution or state for state in states]
-    has_coarse = any(state.coarse_step_solution is not None for state in states)
+    own = [state.coarse_step_solution is not None for state in states]
     return first.replaced(
         contacts=contacts[0].joined_with(*contacts[1:], rows=rows),
-        coarse_step_solution=joined_states(coarse) if has_coarse else None,
+        coarse_step_solution=joined_states(coarse) if any(own) else None,
         **{n: np.concatenate(a, axis=_AXES[n]) for n, a in arrays.items()},
     )
 

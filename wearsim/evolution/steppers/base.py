@@ -167,10 +167,6 @@ class Stepper(ABC):
     def __init__(self, tolerance: float, forced_step: float | None = None) -> None:
         self.tolerance, self.forced_step = tolerance, forced_step
 
-    def trial(self, proposed: float) -> Trial:
-        """Return the search for the length of a step, with the first trial [passes]."""
-        return Trial(proposed, self.forced_step is not None, self.taper)
-
     def started(self, problem: WearProblem, state: WearState) -> WearState:
         """Return the state from which the integration starts."""
         return state

@@ -120,12 +120,11 @@ class ImplicitStepper(StepDoublingStepper):
         assert state.stepping_error is not None
         assert end.wear_exponents is not None
         assert end.order is not None
-        displaced = np.zeros(step.size)
+        work, order = np.zeros((6, step.size)), np.empty(step.size, np.int64)
+        of_next, estimates, displaced = work[:2], work[2:5], work[5]
         if problem.has_spring:
             aim, scale = SHARE * self.tolerance, done**PART_EXPONENT / left
             of_loads, their_order, displaced = next_steps_of_loads(problem, end, scale, aim, KEEP)
-        work, order = np.empty((5, step.size)), np.empty(step.size, np.int64)
-        of_next, estimates = work[:2], work[2:]
         errors = assess_step(
             self.tolerance,
             left,

@@ -103,10 +103,12 @@ def step_by_formula(
         in_groove[:] = have_groove(problem, state)
     # line loads and wear about which the wear is linearised
     line_load, wear = contacts.line_load, wear_of_contacts(problem, contacts)
-    of_tests = np.empty((7, realisations))
+    rows = np.empty((8, realisations))
+    of_tests, energy = rows[:7], rows[7]
     sums, feedback = np.empty(past.sums.shape[1:]), np.empty(past.feedback.shape[1:])
-    work, of_contacts = np.empty((7, *depths.shape)), np.empty((3, *shape))
-    of_bodies, worn = work[:6], work[6]
+    work, of_each = np.empty((7, *depths.shape)), np.empty((8, *shape))
+    of_bodies, worn, of_contacts, about = work[:6], work[6], of_each[:3], of_each[3:]
+    compliance = np.empty((realisations, bodies.shape[0], 2, strips))
     begin_step(
         past.spans,
         order,
@@ -142,8 +144,6 @@ def step_by_formula(
     stations, iterations = problem.shape[0], np.zeros(realisations, dtype=np.int64)
     most = MAX_LINEAR_EXPONENT if problem.linear_wear else MAX_EXPONENT
     for iteration in range(1, MAX_FIXED_POINT + 1):
-        about = np.empty((5, *shape))
-        compliance = np.empty((realisations, bodies.shape[0], 2, strips))
         linearise_step(*of_step, line_load, wear, exponents, about, compliance)
         batch = contact_batch(problem, about[2], loads.used, *separated(guess, stations))
         warm = contacts if near is None or iteration > 1 else near
@@ -199,7 +199,7 @@ def step_by_formula(
             line_load, wear = solved.line_load, new
         else:  # strips at an edge enter and leave the contact in turn
             line_load, wear = 0.5 * (line_load + solved.line_load), 0.5 * (wear + new)
-    energy, ends = np.empty(realisations), np.empty(depths.shape)
+    spans, ends = of_tests[2:], np.empty(depths.shape)
     fields = np.empty((3, *past.part.shape) if past.part.size else (0, 0, 0))
     past_wear, past_sums = np.empty(past.wear.shape), np.empty(past.sums.shape)
     past_feedback = np.empty(past.feedback.shape)
@@ -237,7 +237,6 @@ def step_by_formula(
     if loads.vary:
         others["past_feedback"] = past_feedback.reshape(ROWS, *problem.shape)
         others["terms"] = loads.terms(contacts)
-    spans = of_tests[2:]
     end = state.with_stacked(
         ends,
         Past(past_wear, past_sums, past_feedback, spans, *edges),

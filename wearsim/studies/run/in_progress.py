@@ -146,7 +146,8 @@ class RunInProgress:
         )
         try:
             self._step_to_end()
-            if not self.reached:  # the test on coarse strips may take as long as the last steps
+            # the test on coarse strips may take as long as the last steps
+            if self.path and not self.reached:
                 self._write_in_time(FIRST_CHECKPOINT)
             self._estimate_strip_errors()
             data = self.data(finished=True)
@@ -295,9 +296,9 @@ class RunInProgress:
                 return
             self.recorder.add(advance, self.stop)
             before, *_, state = advance.path
-            start, passes = before.passes.item(), state.passes.item()
+            passes = state.passes.item()
             if self.scenario.contact.auto is not None:
-                self._verify_model(start)
+                self._verify_model(before.passes.item())
             if advance.warning is not None:
                 self.warn(advance.warning)
             if self._watched:
@@ -307,7 +308,7 @@ class RunInProgress:
                         total_passes=self.stop,
                         time=passes / self.problem.kinematics.pass_rate,
                         depth=float(state.cylinder_depth.max()),
-                        step_passes=passes - start,
+                        step_passes=passes - before.passes.item(),
                         depth_error=float(state.depth_error.max()),
                         wall_seconds=self._wall(),
                     )
@@ -315,7 +316,8 @@ class RunInProgress:
             self._check_depth(state)
             if self.stop_requested() and passes < self.stop:
                 self._interrupt()
-            self._write_in_time()
+            if self.path:
+                self._write_in_time()
 
     def _write_in_time(self, interval: float | None = None) -> None:
         """Write a checkpoint if the last one is longer ago than an interval [s].
@@ -323,8 +325,6 @@ class RunInProgress:
         Without an interval it is that of the scenario. A short run has some too: until it is
         reached, as much time passes before a checkpoint as had passed before the last one.
         """
-        if self.path is None:
-            return
         since = time.monotonic() - self._written
         if interval is None:
             if since <= FIRST_CHECKPOINT <= self.scenario.outputs.checkpoint_every:

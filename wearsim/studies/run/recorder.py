@@ -311,7 +311,8 @@ class Recorder:
         self._history.add(advance.problem, end, before)
         # a single assignment: an interrupt before it leaves the previous step current
         self._kept = len(self._history), len(self._records), end, advance.problem.grid
-        self._thin(float(end.passes[0]))
+        if (passes := float(end.passes[0])) > self.schedule.base:  # the test has been prolonged
+            self._thin(passes)
 
     def end_at(self, advance: Advance, state: WearState, stop: float) -> None:
         """Record a state within a step as the end of the run, which resumes from the step's start.
