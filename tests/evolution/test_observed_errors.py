@@ -53,6 +53,12 @@ def test_stated_errors_cover_those_against_a_finer_test(spring: wearsim.Result) 
         assert np.isnan(true.errors[name]).all()  # without the coarse test they are not known
 
 
+def test_first_steps_under_a_spring_have_no_error_of_its_estimated_slope() -> None:
+    first: dict[str, object] = {"load.stiffness": "20 kN/mm", "evolution.strip_error": False}
+    result = run({**SPRING, **first})
+    assert (result.depth_error[1:8] < 0.05 * result.depth[1:8]).all()
+
+
 def test_errors_are_in_final_state_and_summary(spring: wearsim.Result) -> None:
     final = spring.final
     assert final["peak_pressure_error_Pa"] == spring.errors["peak_pressure"][-1]
