@@ -46,6 +46,22 @@ def test_error_of_a_deeper_roller_names_the_depth_to_which_it_is_related(command
     assert any(re.search(warning, text) for text in result.warnings)
 
 
+def test_error_of_the_volume_is_that_of_the_energy_where_the_roller_wears_more(command, scenario):
+    wears = ("wear.cylinder.k_over_h=1e-13 1/Pa", "wear.roller.k_over_h=1e-10 1/Pa")
+    few = ("contact.strips=41", "creepage.longitudinal=3e-4")
+    changes = [part for change in (*wears, *few) for part in ("--set", change)]
+    done = command("run", scenario, "-o", "short.h5", "-q", *changes)
+    result = wearsim.open_results("short.h5")
+    part = 100.0 * float(result.errors["dissipated_energy"][-1] / result.dissipated_energy[-1])
+    stated = float(re.search(r"worn volume within ([\d.]+) %", last_line(done))[1])
+    assert stated == pytest.approx(part, rel=0.05)
+    size, error = map(
+        float, re.search(r"worn volume +([\d.e-]+) ± ([\d.e-]+) mm", done.stdout).groups()
+    )
+    assert size == pytest.approx(1e9 * result.worn_volume[-1], rel=0.01)
+    assert error == pytest.approx(0.01 * part * size, rel=0.05)
+
+
 def test_per_pass_run_has_no_stepping_error(command, scenario):
     changes = ("--set", "evolution.stepper=per-pass", "--set", "operation.passes=30")
     line = last_line(command("run", scenario, "-o", "short.h5", "-q", *changes))
