@@ -6,6 +6,7 @@ import re
 import pytest
 
 import wearsim
+from wearsim.report.text import within
 
 TIME = r"[\d.]+ (us|ms|s)"
 RANDOM = "friction.coefficient={distribution = 'uniform', low = 0.09, high = 0.11}"
@@ -60,6 +61,11 @@ def test_error_of_the_volume_is_that_of_the_energy_where_the_roller_wears_more(c
     )
     assert size == pytest.approx(1e9 * result.worn_volume[-1], rel=0.01)
     assert error == pytest.approx(0.01 * part * size, rel=0.05)
+
+
+@pytest.mark.parametrize(("part", "text"), [(0.012, "1.2 %"), (9e-15, "rounding")])
+def test_relative_error_of_round_off_has_no_digits(part, text):
+    assert within("worn volume", 5.0 * part, 5.0) == f"worn volume within {text}"
 
 
 def test_per_pass_run_has_no_stepping_error(command, scenario):
