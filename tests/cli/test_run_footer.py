@@ -6,6 +6,7 @@ import re
 import pytest
 
 import wearsim
+from wearsim.report.text import within
 
 TIME = r"[\d.]+ (us|ms|s)"
 RANDOM = "friction.coefficient={distribution = 'uniform', low = 0.09, high = 0.11}"
@@ -44,6 +45,27 @@ def test_error_of_a_deeper_roller_names_the_depth_to_which_it_is_related(command
     assert re.search(rf"estimated error of depth +[\d.]+ um, {related} *\n", done.stdout)
     warning = f"estimated error of depth.*: {related}.*, above the tolerance of 0.001 %"
     assert any(re.search(warning, text) for text in result.warnings)
+
+
+def test_error_of_the_volume_is_that_of_the_energy_where_the_roller_wears_more(command, scenario):
+    wears = ("wear.cylinder.k_over_h=1e-13 1/Pa", "wear.roller.k_over_h=1e-10 1/Pa")
+    few = ("contact.strips=41", "creepage.longitudinal=3e-4")
+    changes = [part for change in (*wears, *few) for part in ("--set", change)]
+    done = command("run", scenario, "-o", "short.h5", "-q", *changes)
+    result = wearsim.open_results("short.h5")
+    part = 100.0 * float(result.errors["dissipated_energy"][-1] / result.dissipated_energy[-1])
+    stated = float(re.search(r"worn volume within ([\d.]+) %", last_line(done))[1])
+    assert stated == pytest.approx(part, rel=0.05)
+    size, error = map(
+        float, re.search(r"worn volume +([\d.e-]+) ± ([\d.e-]+) mm", done.stdout).groups()
+    )
+    assert size == pytest.approx(1e9 * result.worn_volume[-1], rel=0.01)
+    assert error == pytest.approx(0.01 * part * size, rel=0.05)
+
+
+@pytest.mark.parametrize(("part", "text"), [(0.012, "1.2 %"), (9e-15, "rounding")])
+def test_relative_error_of_round_off_has_no_digits(part, text):
+    assert within("worn volume", 5.0 * part, 5.0) == f"worn volume within {text}"
 
 
 def test_per_pass_run_has_no_stepping_error(command, scenario):

@@ -53,6 +53,12 @@ def test_stated_errors_cover_those_against_a_finer_test(spring: wearsim.Result) 
         assert np.isnan(true.errors[name]).all()  # without the coarse test they are not known
 
 
+def test_first_steps_under_a_spring_have_no_error_of_its_estimated_slope() -> None:
+    first: dict[str, object] = {"load.stiffness": "20 kN/mm", "evolution.strip_error": False}
+    result = run({**SPRING, **first})
+    assert (result.depth_error[1:8] < 0.05 * result.depth[1:8]).all()
+
+
 def test_errors_are_in_final_state_and_summary(spring: wearsim.Result) -> None:
     final = spring.final
     assert final["peak_pressure_error_Pa"] == spring.errors["peak_pressure"][-1]
@@ -120,6 +126,26 @@ def test_roller_has_at_least_the_error_of_both_bodies() -> None:
     ones = np.ones(2)
     found = observed_errors(course, np.array([0.0, 1.0]), {"descent": ones}, sizes, errors)
     np.testing.assert_allclose(found["descent"], 0.05)
+
+
+@pytest.mark.parametrize("feedback", [False, True])
+def test_pauses_are_not_compared_with_steps_beside_them(feedback: bool) -> None:
+    passes, steps = np.arange(7.0), np.array([0.0, 2.0, 3.2, 4.0, 6.0])
+    force, of_coarse = 3.0 * (passes != 3.0), 3.0 * (steps != 3.2)
+    test, coarse = (
+        {"normal_force": one, "power": 0.1 * one, "peak_pressure": np.sqrt(one)}
+        for one in (force, of_coarse)
+    )
+    course, sizes = Course(steps[1:].tolist(), observed=coarse), np.ones((3, 7))
+    about = (course, passes, test, sizes, 0.0 * sizes)
+
+    def load(points: FloatArray) -> FloatArray:
+        return np.where(np.isin(points, (3.0, 3.2)), 0.0, 4.0)
+
+    found = observed_errors(*about, load=load, feedback=feedback)
+    assert found["normal_force"] == pytest.approx(0.0, abs=1e-12)
+    assert found["power"] == pytest.approx(0.0, abs=1e-12)
+    assert found["peak_pressure"] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_angles_differ_by_less_than_half_a_turn() -> None:

@@ -138,10 +138,18 @@ def observed_errors(
         if name == "normal_force" and not feedback:
             difference[:] = 0.0
         elif name == "normal_force" and load is not None:
-            before = load(passes)[:, None], load(steps)[:, None]
             by_feedback = np.abs(
-                _interpolated(at_common, at_steps, coarse_values - before[1])
-                - _interpolated(at_common, at_passes, fine_values - before[0])
+                np.subtract(
+                    *(
+                        _interpolated(
+                            at_common, at, _between_pauses(force - load(points)[:, None], force)
+                        )
+                        for at, points, force in (
+                            (at_steps, steps, coarse_values),
+                            (at_passes, passes, fine_values),
+                        )
+                    )
+                )
             )
             # both contain errors of interpolation
             difference = np.minimum(difference, by_feedback / np.where(fine != 0.0, fine, np.inf))
@@ -179,7 +187,16 @@ def _over_force(name: str, observed: Mapping[str, Any], points: int, exponent: f
     if exponent == 0.0:
         return values
     force = np.reshape(observed["normal_force"], (points, -1)).mean(axis=1, keepdims=True)
-    return values / np.where(force > 0.0, force, 1.0) ** exponent
+    return _between_pauses(values / np.where(force > 0.0, force, 1.0) ** exponent, force)
+
+
+def _between_pauses(values: FloatArray, force: FloatArray) -> FloatArray:
+    """Return columns whose points without force are between those before and after them."""
+    loaded = np.flatnonzero(force.mean(axis=1) > 0.0)
+    if len(loaded) in {0, len(values)}:
+        return values
+    every = np.arange(len(values))
+    return np.column_stack([np.interp(every, loaded, column[loaded]) for column in values.T])
 
 
 def edge_peaks(

@@ -307,8 +307,8 @@ def within(name: str, error: float, value: float) -> str:
 
 
 def percent(part: float) -> str:
-    """Return a relative error in per cent, or a word where it is below all digits."""
-    return shown(float(part), "%", 2) if part else "rounding"
+    """Return a relative error in per cent, or a word where it is only round-off."""
+    return "rounding" if part < ROUNDING else shown(float(part), "%", 2)
 
 
 def footer(used: list[str], error: str, time: str) -> str:

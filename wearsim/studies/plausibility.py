@@ -107,8 +107,8 @@ def _of_pressure(setup: Setup, load: float, friction: float) -> Iterator[str]:
         file = load_file(scenario)
         remedy = f"is the unit of the load in {file[1]} right?" if file else "is the load right?"
         yield (
-            f"load: {text} exceeds {ELASTIC_PART:.0%} of the contact modulus, more than hardened"
-            f" steel bears; {remedy} A thousandth of it gives {pressure / 1e7:.4g} MPa"
+            f"load: {text} exceeds {100.0 * ELASTIC_PART:g} % of the contact modulus, more than"
+            f" metals bear; {remedy} A thousandth of it gives {pressure / 1e7:.4g} MPa"
         )
     if scenario.fatigue is not None:
         yield from _of_fatigue(scenario.fatigue, pressure, friction, text)

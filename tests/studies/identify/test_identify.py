@@ -42,6 +42,25 @@ def test_known_inputs_give_the_wear_factor_of_a_groove(tmp_path: Path):
     assert found.summary["scatter_seen"] is None
 
 
+def test_shape_of_a_groove_of_little_noise_does_not_choose_the_friction(tmp_path: Path):
+    bench = {
+        "roller": {"radius": "15 mm", "crown_radius": "200 mm", "material": "steel"},
+        "cylinder": {"radius": "30 mm", "material": "bronze"},
+        "operation": {"speed": "600 rpm", "duration": "85 min", "rollers": 2},
+        "load.normal_force": "250 N",
+        "wear.cylinder.k_over_h": "5e-11 1/Pa",
+        "evolution.tolerance": 1e-3,
+    }
+    run = wearsim.run(rig().changed({**bench, "friction.coefficient": 0.12}))
+    rng, y = np.random.default_rng(1), np.linspace(-0.99, 0.99, 900) * run.y[-1]
+    height = rng.normal(0.0, 0.2e-6, y.size) - np.interp(y, run.y, run.profiles[-1])
+    path = write(tmp_path / "t.csv", y, height)
+    friction = {"distribution": "lognormal", "mean": 0.12, "std": 0.008}
+    found = wearsim.identify(rig().changed({**bench, "friction.coefficient": friction}), [path])
+    k = found.tests[0]["k_over_h_per_Pa"]
+    assert k["low"] < 5e-11 < k["high"]
+
+
 def test_records_between_are_those_of_a_run():
     run = wearsim.run(rig().changed({"wear.cylinder.k_over_h": "0.8e-11 1/Pa"}))
     worn = run.values("cylinder_depth_profile")[-1].ravel()

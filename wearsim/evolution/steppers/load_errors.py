@@ -51,8 +51,9 @@ def next_steps_of_loads(
     errors = np.abs(of_loads.reshape(scale.shape) * scale)
     springs = np.broadcast_to(problem.stiffness, scale.shape)
     displaced = np.divide(errors, springs, out=np.zeros_like(errors), where=springs > 0.0)
-    # after the first step the differences hang on the estimated slope of the loads at its start
-    return steps, order, np.where(spans[1] > spans[0], displaced.max(axis=(0, 1)), 0.0)
+    # differences that reach back to the start of the test hang on the estimated slope of the loads
+    oldest, before = (np.take_along_axis(spans, orders[None] - back, axis=0)[0] for back in (0, 1))
+    return steps, order, np.where(oldest > before, displaced.max(axis=(0, 1)), 0.0)
 
 
 def next_steps_of_energy(

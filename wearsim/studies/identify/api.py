@@ -34,12 +34,13 @@ from wearsim.studies.identify.measurements import (
 from wearsim.studies.identify.pooling import FEW_DRAWS, content, specimens_of
 from wearsim.studies.identify.result import IdentificationResult
 from wearsim.studies.identify.traces import Trace, read_trace, smoothed
-from wearsim.studies.identify.trajectories import Grower, Trajectories, check_law
+from wearsim.studies.identify.trajectories import TOLERANCE, Grower, Trajectories, check_law
 from wearsim.studies.progress import shown_progress
 from wearsim.units import QuantityError, as_written
 from wearsim.uq.hierarchy.verdict import NEGLIGIBLE
 
 MOST_DRAWS = 768  # where a trace leaves few of the first ones
+OF_NOISE = 0.15  # tolerance of wear tests over the relative noise of the traces
 _LEAST_SIGNAL = 3.0  # depth over the noise
 _MOST_STD = 0.25  # of a measured depth, over the depth
 _SHARE = ("cylinder", "roller")
@@ -298,7 +299,11 @@ class _Study:
         angles = {
             ready.item.surface: ready.item.angle for ready in group if ready.item.angle is not None
         }
-        grower = Grower(group[0].scenario, draws, self.shared, report, angles)
+        # where the noise is small, numerical errors of a shape would make some draws more probable
+        tolerance = min(
+            [TOLERANCE, *(OF_NOISE * ready.trace.relative_noise for ready in group if ready.trace)]
+        )
+        grower = Grower(group[0].scenario, draws, self.shared, report, angles, tolerance)
         wanted = [Wanted(test.item.surface, test.passes, *test.depths) for test in group]
         trajectories = (
             grower.grow_on_cam(wanted) if self.scenario.cam is not None else grower.grow(wanted)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -63,6 +64,13 @@ class Trace:
     spread: float = 0.0
     difference: bool = False
     notes: tuple[str, ...] = ()
+
+    @property
+    def relative_noise(self) -> float:
+        """Standard deviation of the noise over the depth; infinite where it is not known."""
+        if self.noise is None or not self.depth:
+            return math.inf
+        return self.noise.std / self.depth
 
 
 def read_trace(item: Measurement, crown_radius: float) -> Trace:

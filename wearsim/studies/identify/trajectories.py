@@ -32,7 +32,7 @@ RATIO = 1.3  # of tau between records
 RATIO_OF_TESTS = 1.7  # of K/H between tests
 DRAWS, DRAWS_OF_MANY = 256, 128  # by default, with one test for each draw and with several
 BELOW, ABOVE = 0.75, 1.35  # depths that are covered, over the least and the greatest measured
-TOLERANCE = 1e-2  # of each of many tests, whose scatter is far greater
+TOLERANCE = 1e-2  # greatest one of each of many tests, whose scatter is far greater
 _FEW = 8  # draws
 _MOST_LOST = 0.05  # fraction of the draws whose tests may fail
 _PILOTS = 6  # tests that search for the wear factor of a cam
@@ -188,6 +188,8 @@ class Grower:
         Called with the numbers of completed and of all wear tests.
     angles : mapping of str to float, optional
         Surfaces of a cam by name, and their angles [rad].
+    tolerance : float
+        Least one of the tests of many draws.
     """
 
     def __init__(
@@ -197,6 +199,7 @@ class Grower:
         shared: bool = False,
         on_progress: Callable[[int, int], None] | None = None,
         angles: Mapping[str, float] | None = None,
+        tolerance: float = TOLERANCE,
     ) -> None:
         check_law(scenario)
         dropped = {CYLINDER, ROLLER} if shared else {CYLINDER}
@@ -209,7 +212,7 @@ class Grower:
         self.draws: list[Setup] = [self.drawer.draw(number) for number in range(self.count)]
         self._report = on_progress or (lambda done, total: None)
         self._grid: Grid | None = None
-        self._angles = angles or {}
+        self._angles, self._tolerance = angles or {}, tolerance
 
     def values(self) -> dict[str, FloatArray]:
         """Return the drawn values by key, shape (draws,); means over rollers and time."""
@@ -402,8 +405,8 @@ class Grower:
         table = self._operation(passes[-1])
         ready: list[Setup] = []
         evolution = self.scenario.evolution
-        if self.count > _FEW and evolution.tolerance < TOLERANCE:
-            evolution = evolution.model_copy(update={"tolerance": TOLERANCE})
+        if self.count > _FEW and evolution.tolerance < self._tolerance:
+            evolution = evolution.model_copy(update={"tolerance": self._tolerance})
         for number, k in tests:
             draws = self.draws[number]
             of_roller = k * (roller / cylinder) if self.shared else factors(draws.scenario)[1]

@@ -106,6 +106,11 @@ class RunView(StudyView[Result]):
         result = self.result
         errors = {name: float(np.max(values[-1])) for name, values in result.errors.items()}
         errors["depth_below_nominal"] = result.depth_below_nominal_error
+        of_both, total = self._of_both_bodies()
+        energy = float(np.max(result.dissipated_energy[-1]))
+        # wear by energy: the energy and the volume of each body have the same relative error
+        if math.isclose(errors["dissipated_energy"] * total, of_both * energy):
+            errors["worn_volume"] *= float(np.max(result.worn_volume[-1])) / (total or 1.0)
 
         def stated(label: str, name: str, unit: str) -> Row:
             values = np.asarray(getattr(result, name)[-1])
@@ -159,6 +164,14 @@ class RunView(StudyView[Result]):
             float(np.max(values[-1])) for values in (self.result.depth, self.result.roller_depth)
         )
         return (roller, " of the roller depth") if roller > depth else (depth, "")
+
+    def _of_both_bodies(self) -> tuple[float, float]:
+        """Return the error of the volume worn off both bodies, and that volume [m^3]."""
+        result, last = self.result, self.result.raw.history
+        rollers = result.raw.static["multiplicity"] @ last["roller_worn_volume"][-1]
+        return float(np.max(result.volume_error[-1])), float(
+            np.max(last["worn_volume"][-1] + rollers)
+        )
 
     def study(self) -> Rows:
         """Return rows on the test, its failure, and the effort of the computation."""
@@ -242,7 +255,7 @@ class RunView(StudyView[Result]):
                 )
                 by_depth = " (steps {}, strips {})".format(*map(percent, shares))
                 parts = "steps and strips"
-            volume = np.max(result.volume_error[-1]), np.max(result.worn_volume[-1])
+            volume = self._of_both_bodies()
             error = (
                 f"{within('depth', np.max(result.depth_error[-1]), depth)}{whose}{by_depth},"
                 f" {within('profile', np.max(result.profile_error[-1]), 1.0)},"
