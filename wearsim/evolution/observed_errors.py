@@ -138,18 +138,13 @@ def observed_errors(
         if name == "normal_force" and not feedback:
             difference[:] = 0.0
         elif name == "normal_force" and load is not None:
+            of_fine, of_coarse = (
+                _between_pauses(force - load(points)[:, None], force)
+                for points, force in ((passes, fine_values), (steps, coarse_values))
+            )
             by_feedback = np.abs(
-                np.subtract(
-                    *(
-                        _interpolated(
-                            at_common, at, _between_pauses(force - load(points)[:, None], force)
-                        )
-                        for at, points, force in (
-                            (at_steps, steps, coarse_values),
-                            (at_passes, passes, fine_values),
-                        )
-                    )
-                )
+                _interpolated(at_common, at_steps, of_coarse)
+                - _interpolated(at_common, at_passes, of_fine)
             )
             # both contain errors of interpolation
             difference = np.minimum(difference, by_feedback / np.where(fine != 0.0, fine, np.inf))
@@ -191,7 +186,7 @@ def _over_force(name: str, observed: Mapping[str, Any], points: int, exponent: f
 
 
 def _between_pauses(values: FloatArray, force: FloatArray) -> FloatArray:
-    """Return columns whose points without force are between those before and after them."""
+    """Return columns whose values at points without force are interpolated from the others."""
     loaded = np.flatnonzero(force.mean(axis=1) > 0.0)
     if len(loaded) in {0, len(values)}:
         return values

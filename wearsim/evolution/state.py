@@ -372,10 +372,10 @@ def joined_states(states: Sequence[WearState]) -> WearState:
     rows = len(first.contacts) // len(first.passes)
     # the coarse-step solution of a test begins as the test itself
     coarse = [state.coarse_step_solution or state for state in states]
-    own = [state.coarse_step_solution is not None for state in states]
+    has_coarse = [state.coarse_step_solution is not None for state in states]
     return first.replaced(
         contacts=contacts[0].joined_with(*contacts[1:], rows=rows),
-        coarse_step_solution=joined_states(coarse) if any(own) else None,
+        coarse_step_solution=joined_states(coarse) if any(has_coarse) else None,
         **{n: np.concatenate(a, axis=_AXES[n]) for n, a in arrays.items()},
     )
 

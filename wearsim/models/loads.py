@@ -135,6 +135,11 @@ class FollowerLoad(Load):
         """Return the preload."""
         return self.preload
 
+    def static(self, lift: FloatArray, theta: FloatArray) -> FloatArray:
+        """Return the force [N] or torque [N m] on the follower at rest, at angles `theta` [rad]."""
+        external = self.external(theta) if self.external else 0.0
+        return self.preload + self.spring * lift + external
+
 
 def _periodic(file: InputFile, arm: bool) -> Callable[[FloatArray], FloatArray]:
     """Return a closed cubic spline through the external force or torque of a file."""

@@ -241,8 +241,7 @@ def _jump_speed(turn: CamTurn) -> float | None:
 
     def ratio(panels: Sequence[Panel], theta: FloatArray) -> FloatArray:
         kinematics = turn.rolling(panels, theta)
-        external = load.external(theta) if load.external else 0.0
-        static = load.preload + load.spring * kinematics.lift + external
+        static = load.static(kinematics.lift, theta)
         return np.asarray(-cam.inertia * kinematics.lift_per_rad2 / static)
 
     greatest, _ = extreme(turn.panels, ratio)

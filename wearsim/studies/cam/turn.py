@@ -92,8 +92,7 @@ class CamTurn:
         """Return the force [N] or torque [N m] on the follower, positive on the outer flank."""
         if self.load is None:
             raise ValueError("the load is not that of a follower")
-        external = self.load.external(theta) if self.load.external else 0.0
-        static = self.load.preload + self.load.spring * lift[0] + external
+        static = self.load.static(lift[0], theta)
         return np.asarray(static + self.cam.inertia * self.speed**2 * lift[2])
 
     def point(self, lift: FloatArray, theta: FloatArray, inner: BoolArray | None = None) -> Point:

@@ -32,7 +32,8 @@ RATIO = 1.3  # of tau between records
 RATIO_OF_TESTS = 1.7  # of K/H between tests
 DRAWS, DRAWS_OF_MANY = 256, 128  # by default, with one test for each draw and with several
 BELOW, ABOVE = 0.75, 1.35  # depths that are covered, over the least and the greatest measured
-TOLERANCE = 1e-2  # greatest one of each of many tests, whose scatter is far greater
+# greatest tolerance of a wear test where there are many: the scatter between tests is far greater
+TOLERANCE = 1e-2
 _FEW = 8  # draws
 _MOST_LOST = 0.05  # fraction of the draws whose tests may fail
 _PILOTS = 6  # tests that search for the wear factor of a cam
@@ -189,7 +190,7 @@ class Grower:
     angles : mapping of str to float, optional
         Surfaces of a cam by name, and their angles [rad].
     tolerance : float
-        Least one of the tests of many draws.
+        Tolerance of the wear tests of many draws, if that of the scenario is smaller.
     """
 
     def __init__(
