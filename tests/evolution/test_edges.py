@@ -240,7 +240,8 @@ def test_abrupt_edge_of_a_tightly_crowned_groove_is_part_of_the_stated_error() -
     short = {"operation.duration": "98 min"}
     result = run({**crowned, **short})
     fine = {"contact.strips": 193, "contact.width": "1.92 mm"}
-    true = run({**PLAIN, **crowned, **short, **fine}).peak_pressure[-1].max()
-    difference = true - result.peak_pressure[-1].max()
+    last = slice(-6, None)  # the peak varies from step to step
+    true = run({**PLAIN, **crowned, **short, **fine}).peak_pressure[last].max()
+    difference = true - result.peak_pressure[last].max()
     assert difference > 0.03 * true
     assert difference < result.errors["peak_pressure"][-1].max() < 0.3 * true

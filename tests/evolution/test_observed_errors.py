@@ -110,6 +110,20 @@ def test_error_is_the_greatest_of_the_last_differences() -> None:
     np.testing.assert_allclose(found[3:], 0.0, atol=1e-12)  # it is no longer recent
 
 
+def test_peaks_of_the_coarse_test_at_one_or_two_steps_are_no_error() -> None:
+    passes = np.arange(13.0)
+    pressure, coarse = 300.0 - 2.0 * passes, 303.0 - 2.02 * passes
+    spoilt = coarse.copy()
+    spoilt[[3, 4, 8, 12]] *= [1.5, 1.1, 1.3, 1.2]
+
+    def errors(other: FloatArray) -> FloatArray:
+        course = Course(passes[1:].tolist(), observed={"peak_pressure": other[:, None]})
+        return of_exact_sizes(course, passes, {"peak_pressure": pressure[:, None]})["peak_pressure"]
+
+    assert errors(spoilt)[:, 0] == pytest.approx(errors(coarse)[:, 0], rel=0.2)
+    assert errors(1.01 * coarse)[-1] > 1.5 * errors(coarse)[-1]
+
+
 def test_power_laws_are_compared_without_error_of_interpolation() -> None:
     passes = np.geomspace(1.0, 1e6, 40)
     steps = np.geomspace(2.0, 1e6, 13)

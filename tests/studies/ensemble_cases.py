@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
 
 from tests.studies.random_examples import CREEPAGE, LOAD, SLACK, scenario_of
 from wearsim.scenario import Scenario
+from wearsim.studies.ensemble.api import ensemble
 from wearsim.studies.ensemble.file.parts import read_ensemble
 from wearsim.studies.ensemble.result import EnsembleResult
 
@@ -31,7 +36,15 @@ def small(**changes: object) -> Scenario:
 
 def partly_failing(**changes: object) -> Scenario:
     """Return tests of which some fail, by a limit on the number of steps."""
-    return small(evolution__max_steps=31, **changes)
+    return small(evolution__max_steps=median_steps(), **changes)
+
+
+@cache
+def median_steps() -> int:
+    """Return the median of the steps of twelve of the small tests."""
+    with TemporaryDirectory() as folder:
+        tests = ensemble(small(), 12, Path(folder) / "tests.h5", scheduler="serial")
+        return int(np.median(tests.values("steps")))
 
 
 def contents(path: Path | EnsembleResult) -> dict[str, bytes]:

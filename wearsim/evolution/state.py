@@ -281,11 +281,12 @@ class WearState:
         state.__dict__.update(stacked=depths, past=past)
         return state
 
-    def with_added(self, depths: Depths) -> WearState:
-        """Return the state with depths added to those of cylinder and rollers [m]."""
+    def with_added(self, depths: Depths, energy: FloatArray | float = 0.0) -> WearState:
+        """Return the state with depths of cylinder and rollers [m] and energy [J] added."""
         return self.replaced(
             cylinder_depth=self.cylinder_depth + depths[0],
             roller_depth=self.roller_depth + depths[1],
+            energy=self.energy + energy,
         )
 
     def contacts_of(self, realisations: IntArray) -> IntArray:

@@ -40,7 +40,6 @@ from wearsim.types import FloatArray, Grid
 LOOSER = 12.0  # tolerance of the coarse test over that of the test
 LOOSER_ITERATIONS = 4.0  # the same of the iterations of a step
 LOOSEST = 0.1  # greatest tolerance of a coarse test
-COARSE_TAPER = 2.0  # as of `Trial`; fewer steps before the end leave the estimates as they are
 # safety factors on the differences of depth, volume and profile where the rate of wear does not
 # depend on the strips, where it does, and before wear: later, wear reduces errors of the shape
 COVER, PARTIAL_COVER, FRESH_COVER = (

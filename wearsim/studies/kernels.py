@@ -65,6 +65,7 @@ def kernels_of(
     compliant, implicit = model in {"slender", "semi-hertzian"}, name in {"auto", "implicit"}
     linearised = steps and compliant and (implicit or coarse)
     by_doubling = varies or theory == "fastsim"
+    by_differences = theory != "fastsim" and (coarse or not varies)
     doubled = name != "per-pass" if not (compliant and implicit) else evolution.step is not None
     called: list[tuple[bool, Iterable[str]]] = [
         (model in _MODELS, _MODELS.get(model, ())),
@@ -75,11 +76,12 @@ def kernels_of(
         (strip_theory and (fields or not batched), {"solve_strips"}),
         (strip_theory and batched and steps and name == "per-pass", {"run_passes"}),
         (linearised, {"begin_step", "linearise_step", "compare_step", "end_step", "next_steps"}),
-        (linearised, {"parts_of_aim", "difference_sizes" if by_doubling else "assess_step"}),
-        (linearised and not varies, {"energy_steps"}),
+        (linearised, {"parts_of_aim"}),
+        (linearised and by_doubling, {"difference_sizes"}),
+        (linearised and by_differences, {"assess_step"}),
+        (linearised and (by_differences or not varies), {"energy_steps"}),
         (steps and scenario.fatigue is not None, {"damage_of_step"}),
         (steps and (doubled or (coarse and not compliant)), {"difference_sizes"}),
-        ("process" in roles, {"filter_noise"}),
         ("field" in roles, {"smooth", "half_lengths"}),
     ]
     return {kernel for is_called, kernels in called if is_called for kernel in kernels}

@@ -29,7 +29,7 @@ from wearsim.mechanics.slender.influence import (
     no_table,
     read_influence,
 )
-from wearsim.mechanics.slender.newton import CONVERGED, NOT_FINITE, solve_slender
+from wearsim.mechanics.slender.newton import CONVERGED, NOT_FINITE, TOLERANCE, solve_slender
 from wearsim.mechanics.tangential.strip_interaction import strip_elasticity
 
 STRIPS, SPACING, MODULUS = 17, 3e-4, 1.15e11
@@ -238,7 +238,7 @@ def newton(gap: np.ndarray, load: float, g: int, known: ContactConstants) -> np.
     options = np.full((1, 1), load), CURVATURE[g].reshape(1, 1), SPACING, MODULUS
     solve_slender(
         *(gap.reshape(shape), np.zeros(shape), None, None, *options),
-        *(known.table, known.curvature_influence, line_load, approach),
+        *(known.table, known.curvature_influence, TOLERANCE, line_load, approach),
         *(np.empty(shape), np.empty(shape), *status),
     )
     assert status[0] == CONVERGED
@@ -298,7 +298,14 @@ def test_number_of_failed_sets_of_contacts_is_returned() -> None:
     line_load, approach, status = np.zeros(shape), np.zeros((6, 1)), np.zeros((2, 6), np.int64)
     failed = solve_slender(
         *(gaps.reshape(shape), np.zeros(shape), None, None, np.full((6, 1), 30.0)),
-        *(np.full((6, 1), 100.0), SPACING, MODULUS, known.table, known.curvature_influence),
+        *(
+            np.full((6, 1), 100.0),
+            SPACING,
+            MODULUS,
+            known.table,
+            known.curvature_influence,
+            TOLERANCE,
+        ),
         *(line_load, approach, np.empty(shape), np.empty(shape), *status),
     )
     # two gaps are not finite, and three contacts reach one end or both

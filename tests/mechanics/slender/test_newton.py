@@ -285,8 +285,8 @@ class Check:
         self, change: float, before: float = 0.0, iteration: int = 1, left: bool = False
     ) -> tuple[int, float]:
         result: tuple[int, float] = check_convergence(
-            *(iteration, UNIT, before, change, left, TABLE, self.these.lengths, self.state),
-            *(self.approach, self.line_load),
+            *(iteration, TOLERANCE, before, change, left, self.these.set, self.these.lengths),
+            *(self.state, self.approach, self.line_load),
         )
         return result
 

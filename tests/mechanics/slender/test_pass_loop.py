@@ -20,6 +20,7 @@ from wearsim.mechanics.slender.newton import (
     NO_CONVERGENCE,
     NOT_FINITE,
     SINGULAR,
+    TOLERANCE,
     solve_slender,
 )
 from wearsim.mechanics.slender.pass_loop import (
@@ -135,6 +136,7 @@ def solved(gap: np.ndarray, load: float, g: int) -> tuple[np.ndarray, np.ndarray
         MODULUS,
         CONSTANTS.table,
         CONSTANTS.curvature_influence,
+        TOLERANCE,
         line_load,
         approach,
         half_length,

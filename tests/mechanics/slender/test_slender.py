@@ -14,7 +14,7 @@ from wearsim.mechanics.slender.influence import (
     middle_curvature,
     no_table,
 )
-from wearsim.mechanics.slender.newton import CONVERGED, TOO_FINE, solve_slender
+from wearsim.mechanics.slender.newton import CONVERGED, TOLERANCE, TOO_FINE, solve_slender
 from wearsim.plugins import SharedWear
 from wearsim.types import Grid
 
@@ -47,6 +47,7 @@ def solve(grid, gaps, loads, wear=None, start=None, lengths="coupled", found=Non
         MODULUS,
         influence_table(n),
         (curvature_table if lengths == "coupled" else no_table)(n),
+        TOLERANCE,
         line_load[None],
         approach[None],
         half_length[None],

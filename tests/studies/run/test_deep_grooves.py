@@ -91,7 +91,7 @@ def test_records_of_a_prolonged_run_are_thinned_and_resumed(
     while not open_results(other).finished or left == 0:
         left += 1
         try:
-            studies.resume(other, until=1000.0, stop_requested=after(3))
+            studies.resume(other, until=1000.0, stop_requested=after(2))
         except Interrupted:
             continue
     assert left > 3

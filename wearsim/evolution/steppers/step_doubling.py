@@ -16,11 +16,9 @@ from wearsim.evolution.error_estimates import (
 )
 from wearsim.evolution.pauses import rest
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import WearState
+from wearsim.evolution.state import Depths, WearState
 from wearsim.evolution.steppers.base import Attempt, Step, Stepper
-from wearsim.evolution.steppers.loads import (
-    elastic_approach,
-)
+from wearsim.evolution.steppers.loads import elastic_approaches
 from wearsim.types import BoolArray, FloatArray
 
 # least error of the greatest depth over that of the profile; it is about 0.6 times that one except
@@ -51,10 +49,17 @@ class StepDoublingStepper(Stepper):
         return np.where(state.step > 0.0, state.step, self.first_steps(problem, state))
 
     def first_steps(self, problem: WearProblem, state: WearState) -> FloatArray:
-        """Return the passes that wear off a tenth of the elastic approach, (realisations,)."""
-        cylinder, roller = problem.sum_of_parts(*problem.wear_parts(state.contacts, 1.0))
+        """Return passes that wear off a tenth of an elastic approach, shape (realisations,).
+
+        It is that of the contact that wears most: a cam may have contacts with almost no load.
+        """
+        parts = problem.wear_parts(state.contacts, 1.0)
+        cylinder, roller = problem.sum_of_parts(*parts)
         rate = (cylinder + roller).max(axis=(0, 1, 3))
-        worn, approach = np.where(rate > 0.0, rate, 1.0), elastic_approach(problem, state)
+        own = (parts[0] + parts[1]).max(axis=-1).reshape(-1, rate.size)
+        approaches = elastic_approaches(problem, state).reshape(own.shape)
+        approach = approaches[own.argmax(axis=0), np.arange(rate.size)]
+        worn = np.where(rate > 0.0, rate, 1.0)
         return np.asarray(np.where(rate > 0.0, 0.1 * approach / worn, np.inf))
 
     def attempt(
@@ -86,14 +91,11 @@ class StepDoublingStepper(Stepper):
         coarse = self.whole_step(problem, coarse_start, step, end, scheme)
         if problem.has_nodes:
             end = with_pass_errors(problem, state, end, coarse, scheme, step)
-        negligible = NEGLIGIBLE * self.tolerance
-        bias = variation_bias(problem, end, state.passes, step, self.follows_trends, negligible)
+        bias = self.bias(problem, state, end, step)
         varies = np.zeros(len(step), dtype=np.bool_)
         if bias is not None:
             depths, energy, varies = bias
-            end, coarse = (
-                one.with_added(depths).replaced(energy=one.energy + energy) for one in (end, coarse)
-            )
+            end, coarse = (one.with_added(depths, energy) for one in (end, coarse))
             coarse = biased_coarse_solution(end, coarse, depths)
         passes = np.where(step == stop - state.passes, stop, end.passes)
         after = end.stacked - coarse.stacked
@@ -121,6 +123,13 @@ class StepDoublingStepper(Stepper):
             **auxiliary,
         )
         return (half, end), added, reached, varies
+
+    def bias(
+        self, problem: WearProblem, start: WearState, end: WearState, step: FloatArray
+    ) -> tuple[Depths, FloatArray, BoolArray] | None:
+        """Return the result of `variation_bias` for a step, as far as the tolerance needs it."""
+        negligible = NEGLIGIBLE * self.tolerance
+        return variation_bias(problem, end, start.passes, step, self.follows_trends, negligible)
 
     def whole_step(
         self, problem: WearProblem, start: WearState, step: FloatArray, end: WearState, scheme: Step

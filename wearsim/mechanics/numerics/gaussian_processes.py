@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import accumulate
 
 import numpy as np
 
@@ -85,9 +86,11 @@ def smooth(
     return field
 
 
-@kernel
 def filter_noise(noise: FloatArray, memory: float) -> FloatArray:
     """Return z_0 = w_0, z_k+1 = r z_k + sqrt(1 - r^2) w_k+1, which has unit variance throughout.
+
+    It is not compiled: most paths are short, and processes that only draw inputs need not wait for
+    numba.
 
     Parameters
     ----------
@@ -100,11 +103,9 @@ def filter_noise(noise: FloatArray, memory: float) -> FloatArray:
     -------
     ndarray, shape (points,)
     """
-    path = np.empty(noise.shape[0])
     fresh = math.sqrt((1.0 - memory) * (1.0 + memory))
-    for k in range(noise.shape[0]):
-        path[k] = noise[k] if k == 0 else memory * path[k - 1] + fresh * noise[k]
-    return path
+    path = accumulate(noise.tolist(), lambda last, new: memory * last + fresh * new)
+    return np.fromiter(path, np.float64, len(noise))
 
 
 @kernel

@@ -39,6 +39,7 @@ from wearsim.mechanics.slender.newton import (
     CONVERGED,
     GAP_TOLERANCE,
     SINGULAR,
+    TOLERANCE,
     solve_slender,
 )
 from wearsim.mechanics.tangential.strip_interaction import StripElasticity
@@ -365,6 +366,7 @@ def solve_fully(
         constants.contact_modulus,
         constants.table,
         constants.curvature_influence,
+        TOLERANCE,
         line_load,
         approach,
         np.empty((1, 1, n)),

@@ -62,7 +62,8 @@ from wearsim.types import FloatArray, IntArray
 CONVERGED, SINGULAR, TOO_FINE, NO_CONVERGENCE, NOT_FINITE = range(5)
 CONTINUE = -1
 
-TOLERANCE = 1e-8  # predicted change of the next step, relative to the greatest line load
+# of the next step, over the greatest line load; that with wear is iterated by a step of the test
+TOLERANCE, WEAR_TOLERANCE = 1e-8, 1e-7
 SHRINKING = 0.2  # ratio of successive steps up to which Jacobians may be reused
 FIRST = 0.1  # assumed ratio of the second step to the first
 MUCH = 0.05  # share of the load that starting line loads lack and a foundation corrects
@@ -75,6 +76,20 @@ MAX_ITERATIONS = 100
 CAUTIOUS = 12  # iterations after which the active set is changed cautiously
 MARGIN = 6  # strips followed on either side of the loaded ones
 FIRST_MARGIN = 20  # the same for a foundation, which may load many strips more than the start
+
+
+class ContactSet(NamedTuple):
+    """Contacts of a set: gap [m] and wear compliance [m/(N/m)] of the strips, loads [N].
+
+    Also the strip width [m], 1/(pi E*) [1/Pa], and the table of `influence_table`.
+    """
+
+    gap: FloatArray
+    compliance: FloatArray
+    loads: FloatArray
+    spacing: float
+    unit: float
+    table: FloatArray
 
 
 @subroutine
@@ -121,11 +136,11 @@ def add_penetrated(
 @subroutine
 def check_convergence(
     iteration: int,
-    unit: float,
+    tolerance: float,
     before: float,
     change: float,
     left: bool,
-    table: FloatArray,
+    these: ContactSet,
     lengths: HalfLengths,
     state: NewtonState,
     approach: FloatArray,
@@ -137,6 +152,8 @@ def check_convergence(
 
     Parameters
     ----------
+    tolerance : float
+        As of `solve_slender`.
     before : float
         Change of the previous step, 0 if the active set was another one.
     change, left
@@ -151,7 +168,7 @@ def check_convergence(
     """
     if not change < np.inf:
         return NOT_FINITE, change
-    contacts, entered = line_load.shape[0], False
+    contacts, entered, unit = line_load.shape[0], False, these.unit
     ready = iteration <= CAUTIOUS or (change < 1e-3 and not left)
     for k in range(contacts if ready else 0):
         first, end = state.left[k], state.right[k]
@@ -161,26 +178,12 @@ def check_convergence(
         state.fresh[:] = True
     if left or entered:
         return CONTINUE, 0.0
-    if not change * shrinking < TOLERANCE:
+    if not change * shrinking < tolerance:
         return CONTINUE, change
     for k in range(contacts):
-        first, end = complete_surface(k, approach[k], table, unit, line_load, lengths, state)
+        first, end = complete_surface(k, approach[k], these.table, unit, line_load, lengths, state)
         entered |= add_penetrated(k, first, end, iteration, unit, state, approach, line_load)
     return (CONTINUE, 0.0) if entered else (CONVERGED, change)
-
-
-class ContactSet(NamedTuple):
-    """Contacts of a set: gap [m] and wear compliance [m/(N/m)] of the strips, loads [N].
-
-    Also the strip width [m], 1/(pi E*) [1/Pa], and the table of `influence_table`.
-    """
-
-    gap: FloatArray
-    compliance: FloatArray
-    loads: FloatArray
-    spacing: float
-    unit: float
-    table: FloatArray
 
 
 @subroutine
@@ -362,6 +365,7 @@ def solve_slender(
     contact_modulus: float,
     table: FloatArray,
     curvature_influence: FloatArray,
+    tolerance: float,
     line_load: FloatArray,
     approach: FloatArray,
     half_length: FloatArray,
@@ -395,6 +399,9 @@ def solve_slender(
     table, curvature_influence : ndarray
         From `influence_table`, and from `curvature_table` or, for half-lengths without interaction
         of the strips, `no_table`.
+    tolerance : float
+        Predicted change of the next step, over the greatest line load, at which a set has
+        converged.
     line_load : ndarray, shape (sets, contacts, strips)
         Starting line loads, all zero in a contact without a start; overwritten with q [N/m].
     approach : ndarray, shape (sets, contacts)
@@ -466,7 +473,7 @@ def solve_slender(
                 if bodies is not None:
                     add_depths(members, wear, state.change, state.surface)
                 outcome, before = check_convergence(
-                    iteration, unit, before, change, left, table, lengths, state, delta, total
+                    iteration, tolerance, before, change, left, these, lengths, state, delta, total
                 )
                 if outcome == CONTINUE and iteration == MAX_ITERATIONS:
                     outcome = NO_CONVERGENCE

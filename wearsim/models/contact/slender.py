@@ -36,8 +36,8 @@ from wearsim.plugins import (
 from wearsim.plugins.contact_model import naming_contact, solved_one_by_one
 from wearsim.types import FloatArray, Grid, IntArray, Material
 
-#: Strip width [m], E* [Pa] and the two tables of `mechanics.slender.newton.solve_slender`.
-Constants: TypeAlias = tuple[float, float, FloatArray, FloatArray]
+#: Strip width [m], E* [Pa], two tables and tolerance of `mechanics.slender.newton.solve_slender`.
+Constants: TypeAlias = tuple[float, float, FloatArray, FloatArray, float]
 _FAILURE = {
     kernels.SINGULAR: "its equations are singular: check the gap, the load and the materials",
     kernels.TOO_FINE: f"a half-length exceeds {np.exp(HIGHEST):.0f} strip widths",
@@ -329,7 +329,10 @@ class Slender(StripModel):
         warm: ContactBatchSolution | None,
     ) -> NormalContacts:
         """Solve the normal problems; arguments as in `solve`."""
-        constants = self._grid.spacing, self._pair.contact_modulus, self._table, self._bend
+        worn = wear_compliance is not None or coupling is not None
+        tolerance = kernels.WEAR_TOLERANCE if worn else kernels.TOLERANCE
+        modulus, tables = self._pair.contact_modulus, (self._table, self._bend)
+        constants = self._grid.spacing, modulus, *tables, tolerance
         size = 1 if coupling is None else len(coupling.bodies)
         normal = NormalContacts.starting(batch, size, warm)
         if not normal.solve(wear_compliance if coupling is None else coupling, constants):

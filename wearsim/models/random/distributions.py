@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from functools import cached_property
+from copy import copy
+from functools import cached_property, lru_cache
 from typing import Annotated, Any, Self, TypeAlias
 
 import numpy as np
@@ -20,6 +21,7 @@ from wearsim.uq.distributions.maxent import Infeasible, maximum_entropy
 from wearsim.uq.distributions.mixture import Mixture
 from wearsim.uq.distributions.truncated_normal import TruncatedNormal, cut_normal
 
+_maximum_entropy = lru_cache(maximum_entropy)  # a scenario is read several times
 _LARGEST_SCORE = 40.0  # above the normal score of any floating-point number below 1
 _ENTROPY = (
     "Jaynes, Physical Review 106 (1957), DOI 10.1103/PhysRev.106.620",
@@ -234,7 +236,7 @@ class MaxentOptions(Options):
 
     def distribution(self) -> MaxentDistribution:
         """Return the distribution of maximum entropy."""
-        return maximum_entropy(self.support, self.mean, self.std, self.mean_log)
+        return copy(_maximum_entropy(self.support, self.mean, self.std, self.mean_log))
 
 
 def check_rising(low: float, high: float, info: ValidationInfo) -> None:

@@ -21,7 +21,7 @@ from wearsim.evolution.steppers.implicit import ImplicitStepper
 from wearsim.evolution.steppers.per_pass import PerPassStepper
 from wearsim.evolution.steppers.single_step import explicit_step
 from wearsim.evolution.steppers.stabilised import StabilisedStepper
-from wearsim.evolution.strip_errors import COARSE_TAPER, LOOSER, LOOSEST
+from wearsim.evolution.strip_errors import LOOSER, LOOSEST
 from wearsim.evolution.strips import Surfaces
 from wearsim.plugins import ContactModel
 from wearsim.scenario import FatigueChoice, Scenario
@@ -131,19 +131,18 @@ def coarse_stepper(setup: Setup, problem: WearProblem) -> Stepper | None:
     free = replace(setup.scenario, evolution=evolution.model_copy(update={"stepper": "auto"}))
     tolerance = min(LOOSER * evolution.tolerance, LOOSEST)
     if chosen_stepper(free, problem.model, problem.contacts_each) == "implicit":
-        stepper = ImplicitStepper(tolerance, by_doubling=_by_doubling(setup.scenario))
-        stepper.taper = COARSE_TAPER
-        return stepper
+        # steps by differences need a third of the contacts, and an error of a tenth is enough
+        return ImplicitStepper(tolerance, by_doubling=_by_doubling(setup.scenario) or False)
     return StabilisedStepper(tolerance)
 
 
-def _by_doubling(scenario: Scenario) -> bool:
-    """Return whether step doubling estimates the errors of implicit steps.
+def _by_doubling(scenario: Scenario) -> bool | None:
+    """Return whether step doubling estimates the errors of implicit steps, as `ImplicitStepper`.
 
     FASTSIM slips in whole elements: in partial slip the power of a strip changes by jumps, and the
     errors of many steps add up unseen by differences.
     """
-    return getattr(scenario.contact.options, "tangential", None) == "fastsim"
+    return getattr(scenario.contact.options, "tangential", None) == "fastsim" or None
 
 
 def merged_rollers(setup: Setup) -> tuple[list[int], FloatArray]:

@@ -137,7 +137,7 @@ class CappedStepper(ImplicitStepper):
         Greatest ratio of a step to the passes done; a first step is a single pass or less.
     """
 
-    def __init__(self, tolerance: float, longest: float, by_doubling: bool) -> None:
+    def __init__(self, tolerance: float, longest: float, by_doubling: bool | None) -> None:
         super().__init__(tolerance, by_doubling=by_doubling)
         self.longest = longest
 
