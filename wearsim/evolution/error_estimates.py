@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from wearsim.contact_batch import ContactBatchSolution
 from wearsim.evolution.contacts import with_contacts
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import mean_along, sum_in_order, worn_volume
@@ -149,8 +150,11 @@ def variation_bias(
     cylinders, all_rollers, energies = (np.zeros_like(values) for values in (*end.depths, first))
     places = chosen.nonzero()[0]
     if places.size:
-        part, length = (averaged.at(places), end.at(places), loads[..., places]), passes[places]
-        mean = _shifted_wear(*part, {}, length)
+        here, state, length = averaged.at(places), end.at(places), passes[places]
+        part = here, state, loads[..., places]
+        # where loads alone vary, the contacts of the end are those at their means
+        known = all(name == "normal_force_offset" for name, *_ in deviations)
+        mean = _wear(here, state.contacts, length) if known else _shifted_wear(*part, {}, length)
         for name, shift in shifts:
             less, more = (
                 _shifted_wear(*part, {name: change}, length)
@@ -206,8 +210,15 @@ def _shifted_wear(
     }
     shifted = problem.with_inputs(replace(problem.inputs, **values)) if values else problem
     contacts = solve_present(shifted, end, loads + shifts.get("normal_force_offset", 0.0))
-    energy = shifted.total_power(contacts.power) * (passes / shifted.kinematics.pass_rate)
-    return *worn_depths(shifted, contacts, passes), energy
+    return _wear(shifted, contacts, passes)
+
+
+def _wear(
+    problem: WearProblem, contacts: ContactBatchSolution, passes: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return wear and energy of some passes, as `_shifted_wear`."""
+    energy = problem.total_power(contacts.power) * (passes / problem.kinematics.pass_rate)
+    return *worn_depths(problem, contacts, passes), energy
 
 
 def half_quadrature(problem: WearProblem, state: WearState) -> tuple[WearProblem, WearState]:

@@ -50,7 +50,7 @@ from wearsim.studies.roller_ends import width_between_edges
 from wearsim.studies.run.recorder import history_row
 from wearsim.types import FloatArray, IntArray
 
-TOLERANCE = 1e-6  # relative error of a quantity at its limit
+LOCATED = 0.01  # relative error of a quantity at its limit, over the tolerance of the test
 FLAT = 0.05  # log-slope below which the numerical error of a life is searched for
 _LIMITS = "the limits in [limit]"  # which a test shall reach before it is too deep
 _BACK = 0.01  # part of the passes over which the log-slope is taken
@@ -105,6 +105,7 @@ class _Group:
         scenario = runs[0].scenario
         self.runs, self.limits, self.stepper = runs, limits, runs[0].stepper
         self.threshold, self.stop = scenario.outputs.width_threshold, runs[0].stop
+        self.located = LOCATED * scenario.evolution.tolerance
         self.problem = joined_problem([run.problem for run in runs])
         self.state = fresh_state(self.problem)
         self.evolution = Evolution(
@@ -188,7 +189,7 @@ class _Group:
 
         def locate(chosen: IntArray) -> list[Crossings]:
             return first_crossings(
-                self.limits, self.stepper, advance, open_places[chosen], TOLERANCE
+                self.limits, self.stepper, advance, open_places[chosen], self.located
             )
 
         # a step without crossings solves nothing
