@@ -53,7 +53,8 @@ class Trial:
     Attributes
     ----------
     proposed : float
-        Length of the next trial step, or of the next step after an accepted one [passes].
+        Length of the next trial step [passes]; after an accepted one that of the next step, which
+        its own search rounds.
     rejected : int
         Trial steps rejected.
     """
@@ -109,13 +110,13 @@ class Trial:
         """
         if self._forced:
             return True
-        chosen = rounded_length(step * max(SHRINK, ratio))
+        chosen = step * max(SHRINK, ratio)
         if excess <= 1.0:
             # a step shortened by the stop does not limit the length of the next one
             self.proposed = max(chosen, self.proposed) if step < self.proposed else chosen
             return True
         self.rejected += 1
-        self.proposed = min(chosen, 0.7 * step)
+        self.proposed = min(rounded_length(chosen), 0.7 * step)
         return False
 
 

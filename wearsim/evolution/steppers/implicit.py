@@ -118,8 +118,7 @@ class ImplicitStepper(StepDoublingStepper):
         end = scheme(problem, state, step)
         if problem.has_nodes:
             end = with_pass_errors(problem, state, end, end, scheme, step)
-        bias = self.bias(problem, state, end, step)
-        if bias is not None:
+        if problem.varies and (bias := self.bias(problem, state, end, step)) is not None:
             end = end.with_added(*bias[:2])
         passes = np.where(step == stop - state.passes, stop, end.passes)
         fixed = state.irreducible

@@ -105,7 +105,10 @@ def step_by_formula(
     line_load, wear = contacts.line_load, wear_of_contacts(problem, contacts)
     rows = np.empty((8, realisations))
     of_tests, energy = rows[:7], rows[7]
-    sums, feedback = np.empty(past.sums.shape[1:]), np.empty(past.feedback.shape[1:])
+    # values of the step, and the differences after it
+    of_sums = np.empty((ROWS + 1, *past.sums.shape[1:]))
+    of_feedback = np.empty((ROWS + 1, *past.feedback.shape[1:]))
+    sums, feedback = of_sums[0], of_feedback[0]
     work, of_each = np.empty((7, *depths.shape)), np.empty((8, *shape))
     of_bodies, worn, of_contacts, about = work[:6], work[6], of_each[:3], of_each[3:]
     compliance = np.empty((realisations, bodies.shape[0], 2, strips))
@@ -201,8 +204,7 @@ def step_by_formula(
             line_load, wear = 0.5 * (line_load + solved.line_load), 0.5 * (wear + new)
     spans, ends = of_tests[2:], np.empty(depths.shape)
     fields = np.empty((3, *past.part.shape) if past.part.size else (0, 0, 0))
-    past_wear, past_sums = np.empty(past.wear.shape), np.empty(past.sums.shape)
-    past_feedback = np.empty(past.feedback.shape)
+    past_wear, past_sums, past_feedback = np.empty(past.wear.shape), of_sums[1:], of_feedback[1:]
     end_step(
         *of_step,
         past.separation,
