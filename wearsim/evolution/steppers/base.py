@@ -53,8 +53,8 @@ class Trial:
     Attributes
     ----------
     proposed : float
-        Length of the next trial step [passes]; after an accepted one that of the next step, which
-        its own search rounds.
+        Length of the next trial step [passes]; after an accepted one that of the next step, not
+        rounded.
     rejected : int
         Trial steps rejected.
     """
