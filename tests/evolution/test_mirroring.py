@@ -79,7 +79,7 @@ def test_accepted_steps_with_almost_equal_errors_propose_the_same_step():
     for ratio in (1.37, 1.37 * (1.0 + 1e-12)):
         trial = Trial(100.0, forced=False)
         assert trial.accepts(0.4, trial.proposed, ratio)
-        proposed.append(trial.proposed)
+        proposed.append(Trial(trial.proposed, forced=False).proposed)
     assert proposed[0] == proposed[1]
     assert rounded_length(math.inf) == math.inf
     assert rounded_length(0.0) == 0.0
