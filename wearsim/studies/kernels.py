@@ -58,14 +58,15 @@ def kernels_of(
     by_strips, batched = model in _MODELS and model != "hertz-fastsim", model == "slender"
     strip_theory = by_strips and theory == "strip"
     roles = {item.role for item in scenario.random}
-    varies = "process" in roles or not scenario.load.built.constant
+    constant = scenario.load.built.constant
+    varies = "process" in roles or not constant
     redrawn = any(item.is_redrawn for item in scenario.random)
     # the test on coarse strips
     coarse = evolution.strip_error and not (name == "per-pass" and redrawn)
     compliant, implicit = model in {"slender", "semi-hertzian"}, name in {"auto", "implicit"}
     linearised = steps and compliant and (implicit or coarse)
     by_doubling = varies or theory == "fastsim"
-    by_differences = theory != "fastsim" and (coarse or not varies)
+    by_differences = theory != "fastsim" and (not varies or (coarse and constant))
     doubled = name != "per-pass" if not (compliant and implicit) else evolution.step is not None
     called: list[tuple[bool, Iterable[str]]] = [
         (model in _MODELS, _MODELS.get(model, ())),

@@ -131,8 +131,12 @@ def coarse_stepper(setup: Setup, problem: WearProblem) -> Stepper | None:
     free = replace(setup.scenario, evolution=evolution.model_copy(update={"stepper": "auto"}))
     tolerance = min(LOOSER * evolution.tolerance, LOOSEST)
     if chosen_stepper(free, problem.model, problem.contacts_each) == "implicit":
-        # steps by differences need a third of the contacts, and an error of a tenth is enough
-        return ImplicitStepper(tolerance, by_doubling=_by_doubling(setup.scenario) or False)
+        by_doubling = _by_doubling(setup.scenario)
+        if by_doubling is None and problem.constant_load is not None:
+            # single steps need a third of the contacts, and an error of a tenth is sufficient; at
+            # jumps of a logged load, however, their error may not fall with their length
+            by_doubling = False
+        return ImplicitStepper(tolerance, by_doubling=by_doubling)
     return StabilisedStepper(tolerance)
 
 
