@@ -129,6 +129,14 @@ def test_run_stopped_before_or_in_a_pause_equals_an_unbroken_one(name: str, path
     assert run_differences(in_parts, unbroken) == []
 
 
+def test_errors_by_strips_are_known_where_a_load_rises_slowly_from_zero() -> None:
+    rising = {0: 300, 48: 300, 48.1: 0, 60: 0, 108: 400, 120: 400}
+    wear = {"wear__cylinder__k_over_h": "2.5e-9 1/Pa", "load__stiffness": "1000 N/mm"}
+    result = studies.run(paused(rising, **wear, contact__strips=161, contact__width="20 mm"))
+    assert np.isfinite(result.errors["peak_pressure"]).all()
+    assert not any("error by strips" in text for text in result.warnings)
+
+
 def test_thermal_load_relaxes_in_a_pause() -> None:
     thermal = {"gain": "300 N/W", "time_constant": "30 s"}
     results = [
