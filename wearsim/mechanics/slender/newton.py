@@ -62,7 +62,8 @@ from wearsim.types import FloatArray, IntArray
 CONVERGED, SINGULAR, TOO_FINE, NO_CONVERGENCE, NOT_FINITE = range(5)
 CONTINUE = -1
 
-# of the next step, over the greatest line load; that with wear is iterated by a step of the test
+# predicted change of the next step, relative to the greatest line load; where contacts wear, their
+# wear compliance is iterated in each step of the wear test, and less accuracy is sufficient
 TOLERANCE, WEAR_TOLERANCE = 1e-8, 1e-7
 SHRINKING = 0.2  # ratio of successive steps up to which Jacobians may be reused
 FIRST = 0.1  # assumed ratio of the second step to the first

@@ -331,8 +331,8 @@ class Slender(StripModel):
         """Solve the normal problems; arguments as in `solve`."""
         worn = wear_compliance is not None or coupling is not None
         tolerance = kernels.WEAR_TOLERANCE if worn else kernels.TOLERANCE
-        modulus, tables = self._pair.contact_modulus, (self._table, self._bend)
-        constants = self._grid.spacing, modulus, *tables, tolerance
+        modulus = self._pair.contact_modulus
+        constants = self._grid.spacing, modulus, self._table, self._bend, tolerance
         size = 1 if coupling is None else len(coupling.bodies)
         normal = NormalContacts.starting(batch, size, warm)
         if not normal.solve(wear_compliance if coupling is None else coupling, constants):

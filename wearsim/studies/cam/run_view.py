@@ -44,7 +44,7 @@ class CamRunView(RunView):
 
         def stated(name: str, unit: str, key: str) -> str:
             error = float(np.max(final[f"{name}_error_{key}"]))
-            if unit == "deg" and error >= 0.5 * math.pi:  # as where most of a turn is worn evenly
+            if unit == "deg" and error >= 0.5 * math.pi:  # the angle is unknown
                 return "not determined"
             return with_error(np.asarray(final[f"{name}_{key}"]), error, unit)
 
