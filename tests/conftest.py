@@ -90,6 +90,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
+    Kernel.may_be_interpreted = False  # tests are about compiled kernels, also at the first run
     if hasattr(session.config, "workerinput"):  # one of several processes
         folder = session.config.cache.mkdir("kernels")
         Kernel.__call__ = compiled_once(Kernel.__call__, folder)

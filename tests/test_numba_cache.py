@@ -58,7 +58,7 @@ from wearsim.models.contact.hertz_fastsim import HertzFastsim, HertzFastsimOptio
 from wearsim.mechanics.numerics.gaussian_processes import squared_residuals
 from wearsim.types import Creepage, Grid, Material, OperatingPoint
 
-jit._call_elsewhere = lambda function: None  # compile all of them in this process
+jit._call_elsewhere = lambda name, interpreted: None  # compile all of them in this process
 compiled = event.RecordingListener()
 event.register("numba:compile", compiled)
 
@@ -165,7 +165,7 @@ def test_concurrent_processes_share_an_empty_cache(site: Path, tmp_path: Path):
 
 def kernels() -> set[str]:
     """Return module and name of all kernels and subroutines that are compiled separately."""
-    head = re.compile(r"^@(?:kernel|subroutine)\ndef (\w+)", re.MULTILINE)
+    head = re.compile(r"^@(?:kernel|subroutine|subroutine_of\(\w+\))\ndef (\w+)", re.MULTILINE)
     files = (ROOT / "wearsim" / "mechanics").rglob("*.py")
     return {f"{file.stem}.{name}" for file in files for name in head.findall(file.read_text())}
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import gc
 import sys
+from pathlib import Path
 from types import SimpleNamespace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -181,10 +182,10 @@ def test_other_kernels_are_compiled_in_a_process_alongside(cached, monkeypatch, 
     compile_alongside("large", _compile_others)
     compile_alongside("large", _compile_parts, within=True)
     assert large(1.0) + large(2.0) == 9.0
-    ends = [command[-1].partition("; from ")[2] for command in started]
-    names = "_compile_parts", "_compile_others"
-    calls = [f"{__name__} import {name}; {name}()" for name in names]
-    assert ends == ["; from ".join(calls)] * cached
+    ends = [command[-1].partition("call_functions; ")[2] for command in started]
+    names = [(__name__, "_compile_parts"), (__name__, "_compile_others")]
+    ends = [end.partition("call_functions(")[2] for end in ends]
+    assert ends == [f"{names!r})"] * cached
 
 
 def test_no_process_is_started_for_a_kernel_in_the_cache(monkeypatch, tmp_path):
@@ -209,3 +210,87 @@ def test_nothing_is_started_on_one_processor(monkeypatch, tmp_path):
     before = len(jit._STARTED)
     assert larger(1.0) == 4.0
     assert len(jit._STARTED) == before
+
+
+@pytest.fixture
+def process(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> SimpleNamespace:
+    """Pretend that a process is started that compiles kernels, and let Python interpret them."""
+    one = SimpleNamespace(poll=lambda: None, commands=[])
+
+    def started(command: list[str], **_: object) -> SimpleNamespace:
+        one.commands.append(command[-1])
+        return one
+
+    monkeypatch.setattr(jit, "subprocess", SimpleNamespace(DEVNULL=None, Popen=started))
+    monkeypatch.setattr(jit.os, "sched_getaffinity", lambda _: {0, 1}, raising=False)
+    monkeypatch.setattr(jit, "_SEARCH", 0.0)
+    monkeypatch.setattr(jit.Kernel, "may_be_interpreted", True)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    return one
+
+
+def _interpreted(function: Any, limit: float = 10.0) -> Any:
+    """Return a kernel whose calls with a first number below a limit may be interpreted."""
+    compiled = kernel(function)
+    name = function.__name__
+    compile_alongside(name, _compile_others, "other")
+    compile_alongside(name, _compile_parts, name, is_short=lambda _, x, *__: x < limit)
+    return compiled
+
+
+def test_short_calls_are_interpreted_until_the_kernel_is_in_the_cache(process):
+    def halved(x: float) -> float:
+        return 0.5 * x
+
+    one = _interpreted(halved)
+    assert one(3.0) == one(3.0) == 1.5
+    assert not one.is_ready
+    assert len(process.commands) == 1  # which compiles the kernel itself before the others
+    assert process.commands[0].index("_compile_parts") < process.commands[0].index(
+        "_compile_others"
+    )
+    folder = jit._cache_folder() / "numerics"
+    folder.mkdir()
+    (folder / "test_jit.halved-1.py311.1.nbc").touch()
+    assert one(3.0) == 1.5
+    assert one.is_ready
+
+
+def test_long_calls_are_compiled(process):
+    def doubled(x: float) -> float:
+        return 2.0 * x
+
+    one = _interpreted(doubled)
+    assert one(11.0) == 22.0
+    assert one.is_ready
+    assert "_compile_parts" not in process.commands[0]  # this process compiles the kernel
+
+
+def test_kernels_are_compiled_if_the_other_process_has_ended(process):
+    def tripled(x: float) -> float:
+        return 3.0 * x
+
+    one = _interpreted(tripled)
+    assert (one(1.0), one.is_ready) == (3.0, False)
+    process.poll = lambda: 1
+    assert (one(1.0), one.is_ready) == (3.0, True)
+
+
+def test_nothing_is_interpreted_where_kernels_must_be_compiled(process):
+    def quartered(x: float) -> float:
+        return 0.25 * x
+
+    one = _interpreted(quartered)
+    with jit.only_compiled():
+        assert (one(1.0), one.is_ready) == (0.25, True)
+
+
+def test_calls_that_fail_in_python_are_compiled_with_their_first_arguments(process):
+    def reciprocal(x: float, total: np.ndarray) -> float:
+        total[0] += 1.0
+        return 1.0 / x
+
+    one, total = _interpreted(reciprocal), np.zeros(1)
+    assert (one(2.0, total), one.is_ready) == (0.5, False)
+    assert (one(0.0, total), one.is_ready) == (np.inf, True)  # Python refuses to divide by zero
+    assert total[0] == 2.0

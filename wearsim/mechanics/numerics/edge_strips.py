@@ -106,7 +106,7 @@ def start_edges(strips: EdgeStrips, separation: FloatArray, approach: FloatArray
             part, apart = strips.part[k, i], separation[k, i]
             rise = 0.0
             if 0.0 < part < 1.0:
-                rise = 2.0 * apart / (1.0 - part) ** 2
+                rise = 2.0 * apart / ((1.0 - part) * (1.0 - part))
             elif part <= 0.0:
                 ahead = max(separation[k, min(i + 1, n - 1)], separation[k, max(i - 1, 0)])
                 rise = ahead - apart
@@ -380,7 +380,7 @@ def end_edges(
             part = fields[1, k, i]
             apart = max(depths[one, v, i] + depths[other, v, i] - level[k, i], 0.0)
             if part > 0.0:
-                apart = 0.5 * strips.rise[k, i] * (1.0 - part) ** 2
+                apart = 0.5 * strips.rise[k, i] * ((1.0 - part) * (1.0 - part))
             fields[0, k, i] = apart
 
 

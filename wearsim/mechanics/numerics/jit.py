@@ -13,13 +13,14 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import cache, update_wrapper
 from hashlib import sha256
+from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
 
-from wearsim.operating_system import processors
+from wearsim.operating_system import lock_file, processors
 from wearsim.types import FloatArray
 
 P = ParamSpec("P")
@@ -30,9 +31,14 @@ _OPTIONS: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
 OPTIMISATION = 1  # level at which LLVM optimises kernels
 KEPT = 86400.0  # seconds for which the compiled kernels of other sources are kept
 _KERNELS: list[Kernel] = []
-_SUBROUTINES: list[Callable[..., Any]] = []  # those that numba has not been given yet
+# those that numba has not been given yet, by the functions that Python calls
+_SUBROUTINES: list[tuple[Callable[..., Any], Callable[..., Any]]] = []
 _REPORTS: list[Callable[[str], None]] = []
-_ALONGSIDE: dict[str, list[Callable[[], None]]] = {}  # by the name of a kernel
+_ALONGSIDE: dict[str, list[Alongside]] = {}  # by the name of a kernel
+# kernels of another process; each is interpreted until the cache holds the kernel of the value
+_INTERPRETED: dict[str, str] = {}
+_SEARCHED: dict[str, float] = {}  # when the cache was last searched for those kernels
+_SEARCH = 0.1  # seconds between two searches of the cache
 _STARTED: list[Any] = []  # processes that compile kernels
 _LOCK = threading.RLock()
 
@@ -40,7 +46,8 @@ _LOCK = threading.RLock()
 class Kernel:
     """Function that numba compiles, or reads from the cache, when it is first called.
 
-    numba takes half a second to import and to prepare, and many commands call no kernel.
+    numba takes half a second to import and to prepare, and many commands call no kernel. While
+    another process compiles the function, Python may interpret it, see `compile_alongside`.
 
     Parameters
     ----------
@@ -48,29 +55,61 @@ class Kernel:
         The function in Python.
     """
 
+    may_be_interpreted = True  # of all kernels, see `only_compiled`
+
     def __init__(self, function: Callable[..., Any]) -> None:
         update_wrapper(self, function)
         self.__name__: str = function.__name__
         self._function = function
         self._dispatcher: Any = None
+        self.is_short: Callable[..., bool] | None = None  # whether a call may be interpreted
 
     def __call__(self, *arguments: Any) -> Any:
-        """Call the compiled function."""
-        if self._dispatcher is None:
-            # of the objects of numba and of a compilation almost all remain; collecting garbage
-            # among them takes a tenth of the time
-            with _without_collection():
-                return self.dispatcher(*arguments)
-        return self._dispatcher(*arguments)
+        """Call the compiled function, or the interpreted one while another process compiles it."""
+        if self._dispatcher is not None:
+            return self._dispatcher(*arguments)
+        if self._is_interpreted(arguments):
+            saved = [a.copy() if isinstance(a, np.ndarray) else a for a in arguments]
+            try:
+                with np.errstate(all="ignore"):
+                    return self._function(*arguments)
+            except (ArithmeticError, ValueError):  # compiled functions return what is not finite
+                for changed, before in zip(arguments, saved, strict=True):
+                    if isinstance(changed, np.ndarray) and changed.flags.writeable:
+                        changed[...] = before
+        # of the objects of numba and of a compilation almost all remain; collecting garbage among
+        # them takes a tenth of the time
+        with _without_collection():
+            return self.dispatcher(*arguments)
+
+    def _is_interpreted(self, arguments: Sequence[Any]) -> bool:
+        """Return whether another process compiles the function, which is started if need be."""
+        if not Kernel.may_be_interpreted:
+            return False
+        name, is_short = self.__name__, self.is_short
+        if is_short and name in _ALONGSIDE and is_short(False, *arguments) and not_cached({name}):
+            with _LOCK:
+                _call_elsewhere(name, interpreted=True)
+        if name not in _INTERPRETED or (is_short and not is_short(True, *arguments)):
+            return False
+        if name not in _SEARCHED:
+            for report in _REPORTS:
+                report(name)
+        if time.monotonic() > _SEARCHED.get(name, 0.0) + _SEARCH:
+            if _STARTED[-1].poll() is not None or not not_cached({_INTERPRETED[name]}):
+                del _INTERPRETED[name]
+                return False
+            _SEARCHED[name] = time.monotonic()
+        return True
 
     @property
     def dispatcher(self) -> Any:
         """Dispatcher of numba, which compiled functions call."""
         with _LOCK:
             if self._dispatcher is None:
-                functions = _ALONGSIDE.pop(self.__name__, [])
-                if functions and not_cached({self.__name__}):
-                    _call_elsewhere(functions)  # before numba is imported, for half a second
+                if self.__name__ in _ALONGSIDE and not_cached({self.__name__}):
+                    # before numba is imported, for half a second
+                    _call_elsewhere(self.__name__, interpreted=False)
                 self._dispatcher = _compiled(self._function)
         return self._dispatcher
 
@@ -179,11 +218,13 @@ def kept(values: object) -> None:
 
 
 def _register_subroutines() -> None:
-    from numba.extending import register_jitable  # noqa: PLC0415
+    from numba.extending import overload  # noqa: PLC0415
 
+    # a call passes an array of a tuple as nine numbers: a quarter of the time of a contact
+    options: Any = _OPTIONS | {"forceinline": True}
     while _SUBROUTINES:
-        # a call passes an array of a tuple as nine numbers: a quarter of the time of a contact
-        register_jitable(**_OPTIONS, forceinline=True)(_SUBROUTINES.pop())
+        called, compiled = _SUBROUTINES.pop()
+        overload(called, jit_options=options, strict=False)(lambda *_, one=compiled, **__: one)
 
 
 @contextmanager
@@ -234,10 +275,33 @@ def subroutine(function: Callable[P, R]) -> Callable[P, R]:
     A subroutine needs no wrapper for Python and no entry in the cache, which saves a third of the
     compilation time.
     """
-    _SUBROUTINES.append(function)
-    if "numba" in sys.modules:
-        _register_subroutines()
-    return function
+    return subroutine_of(function)(function)
+
+
+def subroutine_of(in_python: Callable[P, R]) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Let kernels call a subroutine, in place of which Python calls `in_python`.
+
+    Python takes ten times as long for a loop over the elements of arrays as for whole arrays, of
+    which numba would compile the operations one by one. The results must be equal to the last bit.
+    """
+
+    def decorate(function: Callable[P, R]) -> Callable[P, R]:
+        _SUBROUTINES.append((in_python, function))
+        if "numba" in sys.modules:
+            _register_subroutines()
+        return in_python
+
+    return decorate
+
+
+@contextmanager
+def only_compiled() -> Iterator[None]:
+    """Let Python interpret no kernel in the context, as other processes need them compiled."""
+    before, Kernel.may_be_interpreted = Kernel.may_be_interpreted, False
+    try:
+        yield
+    finally:
+        Kernel.may_be_interpreted = before
 
 
 @contextmanager
@@ -253,11 +317,28 @@ def compilation_reported(report: Callable[[str], None]) -> Iterator[None]:
         _REPORTS.remove(report)
 
 
-def compile_alongside(name: str, function: Callable[[], None], *, within: bool = False) -> None:
+class Alongside(NamedTuple):
+    """Function that compiles kernels in another process, as of `compile_alongside`."""
+
+    function: Callable[[], None]
+    kernels: tuple[str, ...]
+    within: bool
+
+
+def compile_alongside(
+    name: str,
+    function: Callable[[], None],
+    *kernels: str,
+    within: bool = False,
+    is_short: Callable[..., bool] | None = None,
+) -> None:
     """Register a function that compiles kernels in another process, while this one compiles.
 
     This process reads from the cache what the other one has compiled by then, and compiles the
-    rest. Nothing is started without a cache or a second processor.
+    rest. Nothing is started without a cache or a second processor. A test of few strips needs less
+    time in Python than its kernels take to be compiled: if the first call of the kernel `name` is
+    short, the other process compiles all kernels, and Python interprets those it has not compiled
+    yet. Interpreted and compiled kernels have equal results to the last bit.
 
     Parameters
     ----------
@@ -265,29 +346,64 @@ def compile_alongside(name: str, function: Callable[[], None], *, within: bool =
         Kernel whose first call starts the process, if the cache lacks it.
     function : callable
         Public function of a module.
+    *kernels : str
+        Kernels that it compiles.
     within : bool
-        Whether it calls the kernels that `function` compiles; these are then compiled first.
+        Whether the kernel `name` calls them; they are then compiled first.
+    is_short : callable, optional
+        Of the kernel `name` itself: returns whether a call may be interpreted, by whether the
+        process has been started, and by the arguments of the call.
     """
-    functions = _ALONGSIDE.setdefault(name, [])
-    functions.insert(0 if within else len(functions), function)
+    registered = _ALONGSIDE.setdefault(name, [])
+    registered.append(Alongside(function, kernels, within))
+    registered.sort(key=lambda other: 0 if other.within else 1 if name in other.kernels else 2)
+    if is_short is not None:
+        next(one for one in _KERNELS if one.__name__ == name).is_short = is_short
 
 
-def _call_elsewhere(functions: Sequence[Callable[[], None]]) -> None:
-    """Start a process that calls functions, if there are a cache and a second processor for it.
+def _call_elsewhere(name: str, *, interpreted: bool) -> None:
+    """Start a process that compiles what is registered alongside a kernel, if possible.
 
-    It ends when the last function returns, also after the end of this process.
+    There must be a cache and a second processor. The process ends when the last function returns,
+    also after the end of this process. It compiles the kernel itself if Python interprets kernels
+    meanwhile.
     """
-    if not functions or processors() == 1 or _cache_folder() is None:
+    registered = [a for a in _ALONGSIDE.pop(name, ()) if interpreted or name not in a.kernels]
+    if not registered or processors() == 1 or _cache_folder() is None:
         return
-    calls = (
-        f"from {function.__module__} import {function.__name__}; {function.__name__}()"
-        for function in functions
+    # the kernel contains those that it calls
+    called = [a.function for a in registered if not (interpreted and a.within)]
+    functions = [(one.__module__, one.__name__) for one in called]
+    code = (
+        f"import sys; sys.path[:] = {sys.path!r}; "
+        f"from {__name__} import call_functions; call_functions({functions!r})"
     )
-    code = "; ".join([f"import sys; sys.path[:] = {sys.path!r}", *calls])
     quiet: dict[str, Any] = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
     with suppress(OSError):
         command = [sys.executable, "-c", code]
         _STARTED.append(subprocess.Popen(command, **quiet, start_new_session=True))
+        for one in registered if interpreted else ():
+            _INTERPRETED.update((kernel, name if one.within else kernel) for kernel in one.kernels)
+
+
+def call_functions(names: Sequence[tuple[str, str]]) -> None:
+    """Call functions, by module and name, in a process in which every kernel is compiled.
+
+    While another process does so, this one waits for it, and then finds its kernels in the cache.
+    """
+    functions = [getattr(import_module(module), name) for module, name in names]
+    _ALONGSIDE.clear()
+    folder = _cache_folder()
+    assert folder is not None
+    with Path(folder, "compiling").open("w") as file:
+        while True:
+            try:
+                lock_file(file.fileno())
+                break
+            except OSError:
+                time.sleep(_SEARCH)
+        for function in functions:
+            function()
 
 
 def ready_kernels() -> set[str]:
@@ -298,11 +414,11 @@ def ready_kernels() -> set[str]:
 def not_cached(names: Iterable[str]) -> set[str]:
     """Return the kernels, by name, that the disk cache lacks; all if there is no cache.
 
-    The file names are those of numba. If another version names its files differently, the kernels
-    are only considered to be missing.
+    The file names are those of numba, which writes the index of a kernel before its code. If
+    another version names its files differently, the kernels are only considered to be missing.
     """
     folder = _cache_folder()
-    cached = () if folder is None else folder.glob("*/*.nbi")
+    cached = () if folder is None else folder.glob("*/*.nbc")
     return set(names) - {path.name.partition(".")[2].partition("-")[0] for path in cached}
 
 

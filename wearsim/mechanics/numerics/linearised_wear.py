@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from wearsim.mechanics.numerics.jit import kernel, subroutine
@@ -152,9 +154,9 @@ def wear_of_bodies(
             new, old = wear[0, k, i] + wear[1, k, i], old_wear[0, k, i] + old_wear[1, k, i]
             if not (new > 0.0 and old > 0.0):
                 continue
-            rise = np.log(loads[k, i] / old_loads[k, i])
+            rise = math.log(loads[k, i] / old_loads[k, i])
             if abs(rise) > MIN_LOG_CHANGE:
-                exponents[k, i] = min(max(np.log(new / old) / rise, LEAST_EXPONENT), greatest)
+                exponents[k, i] = min(max(math.log(new / old) / rise, LEAST_EXPONENT), greatest)
     sizes = np.empty((3, realisations))
     for v in range(realisations):
         difference, greatest_opening, deepest = 0.0, 0.0, 0.0

@@ -14,10 +14,49 @@ from __future__ import annotations
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import compile_alongside, kernel, subroutine
+from wearsim.mechanics.numerics.jit import (
+    compile_alongside,
+    kernel,
+    subroutine,
+    subroutine_of,
+)
 from wearsim.types import FloatArray
 
 PANEL = 4  # unknowns eliminated together; the loops over the rows of a panel are unrolled
+
+
+def _subtract_rows(matrix: FloatArray, start: int, size: int) -> None:
+    stop = start + PANEL
+    f0, f1, f2, f3 = matrix[stop:size, start:stop].T[:, :, None]
+    a, b, c, d = matrix[start:stop, stop:size]
+    matrix[stop:size, stop:size] -= (f0 * a + f1 * b) + (f2 * c + f3 * d)
+
+
+@subroutine_of(_subtract_rows)
+def subtract_panel(matrix: FloatArray, start: int, size: int) -> None:
+    """Subtract the rows of the panel from `start` on from those after it, with their factors."""
+    s1, s2, s3, stop = start + 1, start + 2, start + 3, start + PANEL
+    i = stop
+    while i + PANEL <= size:  # several rows together, for which the panel is read once
+        i1, i2, i3 = i + 1, i + 2, i + 3
+        f0, f1, f2, f3 = matrix[i, start], matrix[i, s1], matrix[i, s2], matrix[i, s3]
+        g0, g1, g2, g3 = matrix[i1, start], matrix[i1, s1], matrix[i1, s2], matrix[i1, s3]
+        h0, h1, h2, h3 = matrix[i2, start], matrix[i2, s1], matrix[i2, s2], matrix[i2, s3]
+        l0, l1, l2, l3 = matrix[i3, start], matrix[i3, s1], matrix[i3, s2], matrix[i3, s3]
+        for j in range(np.uint64(stop), np.uint64(size)):
+            a, b, c, d = matrix[start, j], matrix[s1, j], matrix[s2, j], matrix[s3, j]
+            matrix[i, j] -= (f0 * a + f1 * b) + (f2 * c + f3 * d)
+            matrix[i1, j] -= (g0 * a + g1 * b) + (g2 * c + g3 * d)
+            matrix[i2, j] -= (h0 * a + h1 * b) + (h2 * c + h3 * d)
+            matrix[i3, j] -= (l0 * a + l1 * b) + (l2 * c + l3 * d)
+        i += PANEL
+    while i < size:
+        f0, f1, f2, f3 = matrix[i, start], matrix[i, s1], matrix[i, s2], matrix[i, s3]
+        for j in range(np.uint64(stop), np.uint64(size)):
+            matrix[i, j] -= (f0 * matrix[start, j] + f1 * matrix[s1, j]) + (
+                f2 * matrix[s2, j] + f3 * matrix[s3, j]
+            )
+        i += 1
 
 
 @kernel
@@ -60,28 +99,29 @@ def factor_in_place(matrix: FloatArray, size: int) -> bool:
             f2 = (matrix[i, s2] - f0 * u02 - f1 * u12) * p2
             f3 = (matrix[i, s3] - f0 * u03 - f1 * u13 - f2 * u23) * p3
             matrix[i, start], matrix[i, s1], matrix[i, s2], matrix[i, s3] = f0, f1, f2, f3
-        i = stop
-        while i + PANEL <= size:  # several rows together, for which the panel is read once
-            i1, i2, i3 = i + 1, i + 2, i + 3
-            f0, f1, f2, f3 = matrix[i, start], matrix[i, s1], matrix[i, s2], matrix[i, s3]
-            g0, g1, g2, g3 = matrix[i1, start], matrix[i1, s1], matrix[i1, s2], matrix[i1, s3]
-            h0, h1, h2, h3 = matrix[i2, start], matrix[i2, s1], matrix[i2, s2], matrix[i2, s3]
-            l0, l1, l2, l3 = matrix[i3, start], matrix[i3, s1], matrix[i3, s2], matrix[i3, s3]
-            for j in range(np.uint64(stop), np.uint64(size)):
-                a, b, c, d = matrix[start, j], matrix[s1, j], matrix[s2, j], matrix[s3, j]
-                matrix[i, j] -= (f0 * a + f1 * b) + (f2 * c + f3 * d)
-                matrix[i1, j] -= (g0 * a + g1 * b) + (g2 * c + g3 * d)
-                matrix[i2, j] -= (h0 * a + h1 * b) + (h2 * c + h3 * d)
-                matrix[i3, j] -= (l0 * a + l1 * b) + (l2 * c + l3 * d)
-            i += PANEL
-        while i < size:
-            f0, f1, f2, f3 = matrix[i, start], matrix[i, s1], matrix[i, s2], matrix[i, s3]
-            for j in range(np.uint64(stop), np.uint64(size)):
-                matrix[i, j] -= (f0 * matrix[start, j] + f1 * matrix[s1, j]) + (
-                    f2 * matrix[s2, j] + f3 * matrix[s3, j]
-                )
-            i += 1
+        subtract_panel(matrix, start, size)
     return True
+
+
+def _subtract_products(
+    matrix: FloatArray, start: int, first: int, end: int, solution: FloatArray
+) -> None:
+    x0, x1, x2, x3 = solution[start : start + PANEL]
+    a, b, c, d = matrix[start : start + PANEL, first:end]
+    solution[first:end] -= (x0 * a + x1 * b) + (x2 * c + x3 * d)
+
+
+@subroutine_of(_subtract_products)
+def subtract_known(
+    matrix: FloatArray, start: int, first: int, end: int, solution: FloatArray
+) -> None:
+    """Subtract the unknowns of the panel from `start` on from the equations `first` to `end`."""
+    s1, s2, s3 = start + 1, start + 2, start + 3
+    x0, x1, x2, x3 = solution[start], solution[s1], solution[s2], solution[s3]
+    for j in range(np.uint64(first), np.uint64(end)):
+        solution[j] -= (x0 * matrix[start, j] + x1 * matrix[s1, j]) + (
+            x2 * matrix[s2, j] + x3 * matrix[s3, j]
+        )
 
 
 @kernel
@@ -102,12 +142,7 @@ def solve_factored(matrix: FloatArray, size: int, solution: FloatArray) -> None:
             for j in range(k + 1, stop):
                 solution[j] -= solution[k] * matrix[k, j]
         if stop < size:
-            s1, s2, s3 = start + 1, start + 2, start + 3
-            x0, x1, x2, x3 = solution[start], solution[s1], solution[s2], solution[s3]
-            for j in range(np.uint64(stop), np.uint64(size)):
-                solution[j] -= (x0 * matrix[start, j] + x1 * matrix[s1, j]) + (
-                    x2 * matrix[s2, j] + x3 * matrix[s3, j]
-                )
+            subtract_known(matrix, start, stop, size, solution)
     for start in range((size - 1) // PANEL * PANEL, -1, -PANEL):
         stop = min(start + PANEL, size)
         for k in range(stop - 1, start, -1):
@@ -118,12 +153,7 @@ def solve_factored(matrix: FloatArray, size: int, solution: FloatArray) -> None:
                 for j in range(start):
                     solution[j] -= solution[k] * matrix[k, j]
             continue
-        s1, s2, s3 = start + 1, start + 2, start + 3
-        x0, x1, x2, x3 = solution[start], solution[s1], solution[s2], solution[s3]
-        for j in range(start):
-            solution[j] -= (x0 * matrix[start, j] + x1 * matrix[s1, j]) + (
-                x2 * matrix[s2, j] + x3 * matrix[s3, j]
-            )
+        subtract_known(matrix, start, 0, start, solution)
 
 
 @subroutine
@@ -195,4 +225,6 @@ def compile_linear_systems() -> None:
     solve_factored(unit, 1, unit[0])
 
 
-compile_alongside("solve_slender", compile_linear_systems, within=True)
+compile_alongside(
+    "solve_slender", compile_linear_systems, "factor_in_place", "solve_factored", within=True
+)

@@ -297,19 +297,20 @@ def assess_step(
             total = 0.0
             for i in range(n):
                 depth, at_edge = depths[b, v, i], 0.0
-                deepest, total, square = max(deepest, depth), total + depth, square + depth**2
+                deepest, total = max(deepest, depth), total + depth
+                square += depth * depth
                 if resolved[v]:
                     at_edge = own[b, v, i] if crossed[b, v, i] else 0.0
                     if young[b, v, i] and past_wear[0, b, v, i] > 0.0:
                         at_edge += factor * past_wear[2, b, v, i]
-                of_edges += (EDGES * at_edge) ** 2
+                of_edges += (EDGES * at_edge) * (EDGES * at_edge)
             volume += volume_weights[1, b] * total
         sizes[0, v] += displaced[v]
         if displaced[v] > 0.0:
             sizes[2, v] += displaced[v] / deepest
         if resolved[v]:
-            part_of_edges = math.sqrt(of_edges / square) if square > 0.0 else 0.0
-            sizes[2, v] = math.hypot(sizes[2, v], part_of_edges)
+            relative = of_edges / square if square > 0.0 else 0.0
+            sizes[2, v] = math.sqrt(sizes[2, v] * sizes[2, v] + relative)
         if discounted[v]:
             sizes[0, v], sizes[1, v] = OF_YOUNG * sizes[0, v], OF_YOUNG * sizes[1, v]
         # the error of the volume may cross zero
@@ -398,4 +399,7 @@ def compile_step_errors() -> None:
     compile_implicit_step()
 
 
-compile_alongside("solve_slender", compile_step_errors)
+compile_alongside(
+    *("solve_slender", compile_step_errors, "assess_step", "next_steps", "energy_steps"),
+    *("parts_of_aim", "begin_step", "linearise_step", "compare_step", "end_step"),
+)

@@ -21,11 +21,12 @@ narrower than long, and by strips with a very small load next to strips with a g
 from __future__ import annotations
 
 import math
+from itertools import zip_longest
 from typing import NamedTuple
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import subroutine
+from wearsim.mechanics.numerics.jit import subroutine, subroutine_of
 from wearsim.mechanics.slender.influence import HIGHEST, interpolation
 from wearsim.types import FloatArray, IntArray
 
@@ -81,7 +82,7 @@ def new_half_lengths(table: FloatArray, contacts: int) -> HalfLengths:
 @subroutine
 def log_half_length(k: int, j: int, line_load: FloatArray, lengths: HalfLengths) -> float:
     """Return ln(a/dy) of the loaded strip `j` of contact `k`."""
-    return float(lengths.log_scale[k] + 0.5 * np.log(line_load[k, j] * lengths.factor[k, j]))
+    return float(lengths.log_scale[k] + 0.5 * math.log(line_load[k, j] * lengths.factor[k, j]))
 
 
 @subroutine
@@ -111,7 +112,7 @@ def fill_half_lengths(
 ) -> None:
     """Fill the half-length a [m] of every strip, (contacts, strips)."""
     for k in range(line_load.shape[0]):
-        one_newton = spacing * np.exp(lengths.log_scale[k])
+        one_newton = spacing * math.exp(lengths.log_scale[k])
         for j in range(line_load.shape[1]):
             half_length[k, j] = one_newton * np.sqrt(line_load[k, j] * lengths.factor[k, j])
 
@@ -128,7 +129,30 @@ def add_around(
         total[here - d] += weight * value[d]
 
 
-@subroutine
+def _add_pairs(
+    table: FloatArray,
+    k: int,
+    left: int,
+    right: int,
+    weight: FloatArray,
+    log_ratio: FloatArray,
+    total: FloatArray,
+) -> None:
+    nodes, middle, part = table.shape[0], table.shape[2] // 2, total[left : right + 1]
+    loaded = weight.nonzero()[0].tolist()
+    for first, second in zip_longest(loaded[::2], loaded[1::2]):
+        added = []
+        for j, u in (first, weight[first]), (second, 0.0 if second is None else weight[second]):
+            strip = first if j is None else j
+            node, (a0, a1, b0, b1), _ = interpolation(nodes, log_ratio[k, strip])
+            rows = table[node : node + 2, :, middle + left - strip : middle + right + 1 - strip]
+            low = (a0 * u) * rows[0, 0] + (a1 * u) * rows[0, 1]
+            added.append((low, (b0 * u) * rows[1, 0] + (b1 * u) * rows[1, 1]))
+        (low, high), (low_of_second, high_of_second) = added
+        part += (low + low_of_second) + (high + high_of_second)
+
+
+@subroutine_of(_add_pairs)
 def add_influences(
     table: FloatArray,
     k: int,
@@ -290,7 +314,7 @@ def find_factors(k: int, line_load: FloatArray, sloped: bool, lengths: HalfLengt
     for j in range(line_load.shape[1]):
         factor[k, j], weight[j] = 1.0, 0.0
         if line_load[k, j] > 0.0:
-            log_ratio[k, j] = log_scale + 0.5 * np.log(line_load[k, j])
+            log_ratio[k, j] = log_scale + 0.5 * math.log(line_load[k, j])
             widest = max(widest, log_ratio[k, j])
     if lengths.table.shape[0] == 0:
         return widest
@@ -309,7 +333,7 @@ def find_factors(k: int, line_load: FloatArray, sloped: bool, lengths: HalfLengt
             if line_load[k, j] > 0.0:
                 after = min(max(factor[k, j] * total[j], LOWEST_FACTOR), HIGHEST_FACTOR)
                 factor[k, j] = after
-                log_ratio[k, j] = log_scale + 0.5 * np.log(line_load[k, j] * after)
+                log_ratio[k, j] = log_scale + 0.5 * math.log(line_load[k, j] * after)
                 widest = max(widest, log_ratio[k, j])
     return widest
 

@@ -180,7 +180,8 @@ def interpolation(
     position = max((tau - LOWEST) / STEP, 0.0)
     node = min(int(position), nodes - 2)
     s = position - node
-    low, low_slope = (1.0 + 2.0 * s) * (1.0 - s) ** 2, s * (1.0 - s) ** 2
+    square = (1.0 - s) * (1.0 - s)
+    low, low_slope = (1.0 + 2.0 * s) * square, s * square
     high, high_slope = s * s * (3.0 - 2.0 * s), s * s * (s - 1.0)
     half = 0.5 / STEP if tau > LOWEST else 0.0
     tangent = (

@@ -294,4 +294,4 @@ def compile_strip_contacts() -> None:
     strip_contacts(strip, strip, contact, 1.0, elasticity, *slips, strip, strip, strip, *filled)
 
 
-compile_alongside("solve_slender", compile_strip_contacts)
+compile_alongside("solve_slender", compile_strip_contacts, "strip_contacts", "solve_strips")

@@ -15,7 +15,7 @@ from wearsim.errors import SolverError, WearsimError, failure_text
 from wearsim.evolution.integrate import Evolution
 from wearsim.evolution.state import fresh_state
 from wearsim.evolution.strips import averaged, same_strips
-from wearsim.mechanics.numerics.jit import not_cached
+from wearsim.mechanics.numerics.jit import not_cached, only_compiled
 from wearsim.plugins import BODIES, ContactModel
 from wearsim.scenario import Scenario, parse_scenario
 from wearsim.studies.ensemble.batch import RealisationRun, RunObservations, batch_groups, observe
@@ -319,7 +319,8 @@ class RealisationRunner:
         """
         if not not_cached(kernels_of(self.scenario)):
             return
-        with suppress(Exception):  # an error of the realisation is reported when it is run
+        # an error of the realisation is reported when it is run
+        with only_compiled(), suppress(Exception):
             run = self.prepare(0, {})
             state, steps = fresh_state(run.problem), run.scenario.evolution.max_steps
             test = run.problem, state, run.stepper, run.stop, steps, run.schedule.next_record
