@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wearsim.errors import SolverError, WearsimError, failure_text
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.integrate import Evolution
-from wearsim.evolution.state import fresh_state
 from wearsim.evolution.strips import averaged, same_strips
 from wearsim.mechanics.numerics.jit import not_cached
 from wearsim.plugins import BODIES, ContactModel

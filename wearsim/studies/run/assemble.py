@@ -10,11 +10,11 @@ from typing import TypeAlias
 import numpy as np
 
 from wearsim.errors import CapabilityError, Mistake, ScenarioError, mistake_in
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.error_estimates import half_quadrature, volume_of
 from wearsim.evolution.fatigue import Fatigue
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import ContactInputs, Kinematics
-from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.forward_euler import ExplicitStepper
 from wearsim.evolution.steppers.implicit import ImplicitStepper

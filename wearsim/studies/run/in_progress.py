@@ -13,6 +13,7 @@ import numpy as np
 
 from wearsim.atomic_write import Storage
 from wearsim.errors import Interrupted, ResultsFileError, SolverError, failure_text
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.limits import Limit
 from wearsim.evolution.observables import (
@@ -24,7 +25,7 @@ from wearsim.evolution.observed_errors import (
     relative_crown_radius,
 )
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import SIGMAS, WearState, fresh_state
+from wearsim.evolution.state import SIGMAS, WearState
 from wearsim.evolution.strip_errors import Course, coarse_courses, strip_errors
 from wearsim.evolution.strips import on_grid, same_strips
 from wearsim.plugins import ContactModelSpec, registry
