@@ -29,6 +29,17 @@ class AxialGap:
         Width of the roller [m].
     greatest : float
         Drop beyond which nothing is of interest, the radius of the roller [m].
+
+    Attributes
+    ----------
+    crown_radius : float or None
+        Relative crown radius of circular crowns, infinite for straight bodies [m].
+    is_crowned : bool
+        Whether the gap is a parabola, as contact models for ellipses need it.
+    has_crowned_cylinder : bool
+        Whether the cylinder is not straight.
+    apex_share : float
+        Position of a contact of unworn bodies over the offset of its roller, without tilt.
     """
 
     def __init__(
@@ -36,22 +47,16 @@ class AxialGap:
     ) -> None:
         self._roller, self._cylinder = roller, cylinder
         self._half = 0.5 * width if width else math.inf
-        self._greatest = greatest
-
-    @cached_property
-    def crown_radius(self) -> float | None:
-        """Relative crown radius of circular crowns, infinite for straight bodies [m]."""
-        radii = self._roller.crown_radius, self._cylinder.crown_radius
-        if radii[0] is None or radii[1] is None:
-            return None
-        if math.isinf(radii[1]):
-            return radii[0]
-        return 1.0 / sum(1.0 / radius for radius in radii if radius is not None)
-
-    @cached_property
-    def is_crowned(self) -> bool:
-        """Whether the gap is a parabola, as contact models for ellipses need it."""
-        return self.crown_radius is not None and math.isfinite(self.crown_radius)
+        self._greatest, self.apex_share = greatest, 1.0
+        crown, other = roller.crown_radius, cylinder.crown_radius
+        self.crown_radius: float | None = crown
+        self.has_crowned_cylinder = other != math.inf
+        if crown is None or other is None:
+            self.crown_radius = None
+        elif self.has_crowned_cylinder:
+            self.crown_radius = 1.0 / (1.0 / crown + 1.0 / other)
+            self.apex_share = self.crown_radius / crown
+        self.is_crowned = self.crown_radius is not None and math.isfinite(self.crown_radius)
 
     def roller_drop(self, s: FloatArray) -> FloatArray:
         """Return the drop of the roller at axial distances from its apex [m]."""
@@ -67,18 +72,6 @@ class AxialGap:
         return np.where(
             np.abs(y) > half, self._greatest, self._cylinder.drop(np.clip(y, -half, half))
         )
-
-    @cached_property
-    def has_crowned_cylinder(self) -> bool:
-        """Whether the cylinder is not straight."""
-        return self._cylinder.crown_radius != math.inf
-
-    def apexes(self, offset: FloatArray) -> FloatArray:
-        """Return the positions of the contacts of rollers with an offset, without tilt [m]."""
-        radius, crown = self.crown_radius, self._roller.crown_radius
-        if not self.has_crowned_cylinder or not self.is_crowned or not radius or not crown:
-            return offset
-        return np.asarray(offset * (radius / crown))
 
     def drop(self, s: FloatArray) -> FloatArray:
         """Return the gap of the bodies at an axial distance from their coinciding apexes [m]."""

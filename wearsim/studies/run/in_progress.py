@@ -41,7 +41,7 @@ from wearsim.studies.failures import (
 from wearsim.studies.plausibility import plausibility_warnings
 from wearsim.studies.preparation import changed_origins, origin_of
 from wearsim.studies.roller_ends import width_between_edges
-from wearsim.studies.run.assemble import assemble_problem, coarse_stepper
+from wearsim.studies.run.assemble import assemble_problem, coarse_stepper, start_height
 from wearsim.studies.run.continuation import earlier_warnings
 from wearsim.studies.run.draws import units_of
 from wearsim.studies.run.grid import start_of_run
@@ -58,7 +58,6 @@ from wearsim.studies.run.recorder import (
 from wearsim.studies.run.result import Result, RunData
 from wearsim.studies.run.setup import Setup
 from wearsim.studies.schedule import RecordSchedule
-from wearsim.studies.start.heights import start_height
 from wearsim.types import FloatArray, Grid
 
 Watcher = Callable[[Event], None]

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import zip_longest
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from wearsim.scenario.parse.fields import CONTACT_FIELDS
 from wearsim.studies.cam.point import Point
 from wearsim.studies.cam.turn import CamTurn, turn_of
 from wearsim.studies.run.inputs import load_mistake, origin
-from wearsim.studies.start.heights import StartExtent, roller_profile, start_extent
+from wearsim.studies.start.heights import StartExtent, start_extent
 from wearsim.types import ContactSolution, FloatArray
 
 _BISECTIONS = 40
@@ -166,13 +167,15 @@ class Setup:
     def kinds(self) -> list[tuple[object, ...]]:
         """Offset, yaw, tilt and start profile of each roller; equal rows are merged."""
         columns = [self.inputs[name][:, 0].tolist() for name in ("offset", "yaw", "tilt")]
-        numbers = range(self.scenario.operation.rollers)
-        profiles = [roller_profile(self.scenario, number) for number in numbers]
-        return list(zip(*columns, profiles, strict=True))
+        profiles = self.scenario.roller.profiles or (None,)  # the last one is that of the others
+        return list(zip_longest(*columns, profiles, fillvalue=profiles[-1]))
 
     @cached_property
     def start_extent(self) -> StartExtent | None:
         """Extent of the start profiles, None if there is none."""
+        cylinder, roller = self.scenario.cylinder, self.scenario.roller
+        if cylinder.profile is None and cylinder.start_surface is None and not roller.profiles:
+            return None
         return start_extent(self.scenario, self.inputs["offset"][:, 0].tolist())
 
     @cached_property
@@ -284,10 +287,9 @@ class Setup:
         inputs : mapping of str to ndarray
             Among them offset [m] and tilt [rad], see `inputs`.
         """
-        shift = (
-            self.tilt_shift(inputs["tilt"]) if self.scenario.creepage.tilt_shifts_contact else 0.0
-        )
-        return np.asarray(self.scenario.axial_gap.apexes(inputs["offset"]) + shift)
+        shifts = self.scenario.creepage.tilt_shifts_contact and inputs["tilt"].any()
+        shift = self.tilt_shift(inputs["tilt"]) if shifts else 0.0
+        return np.asarray(inputs["offset"] * self.scenario.axial_gap.apex_share + shift)
 
     def centre_of(self, positions: FloatArray) -> float:
         """Return the middle of the strips for contact positions [m]."""
