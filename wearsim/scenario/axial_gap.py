@@ -40,12 +40,14 @@ class AxialGap:
         Whether the cylinder is not straight.
     apex_share : float
         Position of a contact of unworn bodies over the offset of its roller, without tilt.
+    roller_drop : callable
+        Drop of the roller at axial distances from its apex [m].
     """
 
     def __init__(
         self, roller: AxialProfile, cylinder: AxialProfile, width: float | None, greatest: float
     ) -> None:
-        self._roller, self._cylinder = roller, cylinder
+        self._cylinder, self._length, self.roller_drop = cylinder, roller.length, roller.drop
         self._half = 0.5 * width if width else math.inf
         self._greatest, self.apex_share = greatest, 1.0
         crown, other = roller.crown_radius, cylinder.crown_radius
@@ -57,10 +59,6 @@ class AxialGap:
             self.crown_radius = 1.0 / (1.0 / crown + 1.0 / other)
             self.apex_share = self.crown_radius / crown
         self.is_crowned = self.crown_radius is not None and math.isfinite(self.crown_radius)
-
-    def roller_drop(self, s: FloatArray) -> FloatArray:
-        """Return the drop of the roller at axial distances from its apex [m]."""
-        return self._roller.drop(s)
 
     def cylinder_drop(self, y: FloatArray) -> FloatArray:
         """Return the drop of the cylinder at axial positions [m]; beyond its ends it is great."""
@@ -75,7 +73,7 @@ class AxialGap:
 
     def drop(self, s: FloatArray) -> FloatArray:
         """Return the gap of the bodies at an axial distance from their coinciding apexes [m]."""
-        return self._roller.drop(s) + self.cylinder_drop(s)
+        return self.roller_drop(s) + self.cylinder_drop(s)
 
     def half_width(self, depth: FloatArray | float) -> FloatArray:
         """Return the half-width of a conformal groove of a depth, at most half the roller [m].
@@ -148,7 +146,7 @@ class AxialGap:
 
         On each side the lower of both drops counts, so that grooves are not too narrow.
         """
-        most = min(self._half, 0.5 * self._roller.length)
+        most = min(self._half, 0.5 * self._length)
         if math.isinf(most):
             most = _FIRST
             while most < _LONGEST and self._lower(np.array([most]))[0] < self._greatest:

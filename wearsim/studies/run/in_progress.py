@@ -43,7 +43,7 @@ from wearsim.studies.preparation import changed_origins, origin_of
 from wearsim.studies.roller_ends import width_between_edges
 from wearsim.studies.run.assemble import assemble_problem, coarse_stepper, start_height
 from wearsim.studies.run.continuation import earlier_warnings
-from wearsim.studies.run.draws import units_of
+from wearsim.studies.run.draws import draw, units_of
 from wearsim.studies.run.grid import start_of_run
 from wearsim.studies.run.recorder import (
     Checkpointed,
@@ -78,7 +78,6 @@ class RunInProgress:
     def __init__(
         self,
         scenario: Scenario,
-        setup: Setup,
         path: Path | None,
         storage: Storage,
         on_event: Watcher | None,
@@ -88,6 +87,7 @@ class RunInProgress:
         limit: Limit | None = None,
     ) -> None:
         self.limit, self.reached = limit, False
+        setup = draw(scenario) if scenario.random else Setup(scenario)
         self.start = grid = start_of_run(scenario, setup)
         if data is not None:
             grid = Grid(data.static["y"], float(data.checkpoint["spacing"]))
@@ -171,13 +171,6 @@ class RunInProgress:
             raise failure from error
         self.on_event(Finished(self._wall()))
         return Result(data, self.path)
-
-    def extended(
-        self, scenario: Scenario, setup: Setup, data: RunData, state: WearState
-    ) -> RunInProgress:
-        """Return the same run with a longer test."""
-        settings = self.path, self.storage, self.on_event, self.stop_requested
-        return RunInProgress(scenario, setup, *settings, data, state, self.limit)
 
     def end_before_limit(self, reason: str) -> Result:
         """Return the result of a run that does not reach its limit, with a warning."""

@@ -14,7 +14,7 @@ from wearsim.evolution.quantities import OneStation, Varying
 from wearsim.mechanics.hertz.ellipse import HertzContact, hertz
 from wearsim.models.loads import FollowerLoad
 from wearsim.plugins import BODIES, JointDistribution, WearLaw
-from wearsim.scenario import RandomInput, Scenario
+from wearsim.scenario import RandomInput, Scenario, require_run
 from wearsim.scenario.axial_gap import AxialGap
 from wearsim.scenario.parse.fields import CONTACT_FIELDS
 from wearsim.studies.cam.point import Point
@@ -79,6 +79,7 @@ class Setup:
     passes: tuple[RandomInput, ...] = ()
     values: Mapping[str, FloatArray] = field(default_factory=dict)
     time_means: Mapping[str, FloatArray] = field(default_factory=dict)
+    _patches: dict[tuple[float, float], HertzContact] = field(default_factory=dict, init=False)
 
     def greatest_mean(self, name: str, mean: float) -> float:
         """Return the greatest mean absolute value of an input of a contact over the whole test.
@@ -192,7 +193,7 @@ class Setup:
     def load_range(self, stop: float | None = None) -> tuple[float, float]:
         """Return the least and greatest load up to `stop` [s], before any feedback [N].
 
-        By default it is that of the whole test.
+        By default it is that of the whole test, which the scenario must define.
 
         Raises
         ------
@@ -200,7 +201,9 @@ class Setup:
             If the load is not defined for the whole time, or is not positive outside of pauses.
         """
         scenario, load = self.scenario, self.scenario.load.built
-        stop = scenario.total_time if stop is None else stop
+        if stop is None:
+            require_run(scenario)
+            stop = scenario.total_time
         if isinstance(load, FollowerLoad):
             low, high = turn_of(scenario).normal_range
             return (low if low > 0.0 else high), high  # where N changes sign, the flank changes
@@ -301,10 +304,6 @@ class Setup:
         gap = self.scenario.axial_gap
         half = 0.0 if gap.is_crowned else self.widest_patch(self.load_range(0.0)[1]).b
         return gap.shift(np.asarray(tilt, dtype=np.float64), half)
-
-    @cached_property
-    def _patches(self) -> dict[tuple[float, float], HertzContact]:
-        return {}
 
     def fresh_patch(self, load: float, curvature: float | None = None) -> HertzContact:
         """Return the patch of the unworn bodies under `load` [N] after Hertz.
