@@ -6,7 +6,7 @@ from tests.benchmarks.calls import RIG, SCENARIOS, calls_per_step, way_to_first_
 # measured: 299 and 116. Calls in C depend on the versions of Python and numpy, and the tests call
 # each kernel through one more function where they run in several processes
 MOST, MOST_OWN = 334, 122
-# measured: 20, 8 and 131; each file and each way back up is one more place to read from a value
+# measured: 20, 8 and 132; each file and each way back up is one more place to read from a value
 # of a scenario to a contact
 MOST_FILES, MOST_WAYS_UP, MOST_CALLS = 20, 8, 135
 
