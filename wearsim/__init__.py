@@ -236,7 +236,8 @@ def __getattr__(name: str) -> object:
     if name not in _MODULES:
         known = "" if name.startswith("_") else f"; it has {', '.join(sorted(_MODULES))}"
         raise AttributeError(f"module 'wearsim' has no attribute '{name}'{known}")
-    return getattr(import_module(_MODULES[name]), name)
+    # kept, so that it is looked up once
+    return globals().setdefault(name, getattr(import_module(_MODULES[name]), name))
 
 
 def __dir__() -> list[str]:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -54,10 +53,19 @@ class Grid:
         Axial position of each strip's centre [m], increasing, equally spaced.
     spacing : float
         Width of a strip [m].
+
+    Attributes
+    ----------
+    strips : int
+        Number of strips.
     """
 
     y: FloatArray
     spacing: float
+    strips: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "strips", self.y.size)
 
     @classmethod
     def spanning(cls, start: float, stop: float, strips: int) -> Grid:
@@ -66,11 +74,6 @@ class Grid:
         # offsets from the middle: a symmetric interval gives a grid symmetric to the bit
         offsets = np.arange(strips, dtype=np.float64) - 0.5 * (strips - 1)
         return cls(y=0.5 * (start + stop) + offsets * spacing, spacing=spacing)
-
-    @cached_property
-    def strips(self) -> int:
-        """Number of strips."""
-        return self.y.size
 
     @property
     def edges(self) -> tuple[float, float]:

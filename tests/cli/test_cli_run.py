@@ -11,7 +11,6 @@ from cli_examples import SCENARIOS, Command
 from tests.interruptible import interruptible
 from wearsim.errors import Interrupted
 from wearsim.studies.opening import open_results
-from wearsim.studies.run import run as study
 
 
 def test_results_file_is_named_after_the_scenario(command: Command, scenario: Path) -> None:
@@ -107,7 +106,7 @@ def test_interrupted_run_ends_with_130(
     def stopped(*_: object, **__: object) -> None:
         raise Interrupted("stopped at pass 5; go on with: wearsim resume short.h5")
 
-    monkeypatch.setattr(study, "run", stopped)
+    monkeypatch.setattr("wearsim.run", stopped)
     result = command("run", scenario)
     assert result.exit_code == 130
     assert result.stderr == "stopped at pass 5; go on with: wearsim resume short.h5\n"

@@ -9,8 +9,8 @@ import pytest
 
 from tests.evolution import built, stepped
 from tests.evolution.test_step_loads import THREE, Line, with_loads
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.quantities import Varying
-from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers import edges
 from wearsim.evolution.steppers.implicit import ImplicitStepper, implicit_step, with_rates
 from wearsim.mechanics.numerics.edge_strips import SETTLED

@@ -13,9 +13,9 @@ from tests.evolution.black_box import boxed
 from tests.evolution.test_fatigue import QUICK, fatigue
 from tests.evolution.test_single_steps import FACTOR, LOAD, PER_LOAD, RADII, Rig, solved
 from tests.evolution.test_step_loads import Line, with_loads
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.error_estimates import volume_of
 from wearsim.evolution.quantities import oscillation
-from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers import edges
 from wearsim.evolution.steppers.base import GROW, Attempt
 from wearsim.evolution.steppers.damage import damage_excess, with_damage

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 from tests.evolution import built, never, stepped
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.error_estimates import volume_of
 from wearsim.evolution.integrate import evolve
-from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.implicit import ImplicitStepper, implicit_step
 
 SPRING = {"load__kind": "spring", "load__stiffness": "690 N/mm"}

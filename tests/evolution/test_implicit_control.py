@@ -9,9 +9,9 @@ import pytest
 
 from tests.evolution import built
 from tests.evolution.test_step_loads import SPRING, THREE, Line
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.error_estimates import COVER, VARYING_COVER, greatest_depth, sizes
 from wearsim.evolution.quantities import Varying
-from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers import edges
 from wearsim.evolution.steppers.base import GROW, SAFETY
 from wearsim.evolution.steppers.implicit import (

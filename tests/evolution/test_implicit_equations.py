@@ -12,7 +12,7 @@ import pytest
 from tests.evolution import built, stepped
 from tests.evolution.test_step_loads import Line
 from wearsim.errors import ContactError, StepError
-from wearsim.evolution.state import fresh_state
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.steppers import edges
 from wearsim.evolution.steppers.conditions import conditions_of
 from wearsim.evolution.steppers.implicit import ImplicitStepper, implicit_step

@@ -7,8 +7,8 @@ import pytest
 
 from tests.evolution import SCENARIOS, built, never, stepped
 from wearsim.errors import ContactError, StepError
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.integrate import Evolution, bisect_failures
-from wearsim.evolution.state import fresh_state
 from wearsim.models.contact.slender import Slender
 from wearsim.scenario import load_scenario
 from wearsim.studies.ensemble.batch import can_step_together, compatible, joined_problem

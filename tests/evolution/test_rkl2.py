@@ -24,9 +24,9 @@ from tests.evolution.test_steppers import (
 )
 from tests.studies.random_examples import SLACK, end_of, scenario_of
 from wearsim.errors import ContactError
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.error_estimates import greatest_depth, volume_of
 from wearsim.evolution.quantities import oscillation, worn_volume
-from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.forward_euler import decay_rates, stability_limit
 from wearsim.evolution.steppers.stabilised import StabilisedStepper, stabilised_step
 

@@ -14,9 +14,8 @@ from tests.evolution.black_box import BlackBox, boxed, foundation_model
 from tests.evolution.test_fatigue import fatigue
 from tests.evolution.test_single_steps import FRICTION, LOAD, RADII, SLIP, solved
 from wearsim.errors import StepError
-from wearsim.evolution.contacts import unworn_contacts
+from wearsim.evolution.contacts import fresh_state, unworn_contacts
 from wearsim.evolution.quantities import Varying
-from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.per_pass import (
     CHUNK,
     DAMAGE_PART,

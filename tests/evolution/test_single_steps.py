@@ -17,6 +17,7 @@ from scipy.optimize import brentq
 from tests.evolution import built, stepped
 from tests.evolution.black_box import BlackBox, boxed
 from wearsim.errors import ContactError, StepError
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.error_estimates import (
     COVER,
     DEPTH_EXPONENT,
@@ -25,7 +26,6 @@ from wearsim.evolution.error_estimates import (
     VARYING_COVER,
 )
 from wearsim.evolution.quantities import Varying
-from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.base import GROW, SAFETY
 from wearsim.evolution.steppers.forward_euler import ExplicitStepper, decay_rates, stability_limit
 from wearsim.evolution.steppers.implicit import ImplicitStepper

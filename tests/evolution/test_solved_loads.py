@@ -11,8 +11,8 @@ import pytest
 from tests.evolution.black_box import BlackBox, boxed
 from tests.evolution.test_step_loads import RISE, THREE, Line, with_loads
 from wearsim.errors import StepError
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.quantities import Varying
-from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.single_step import (
     MAX_LOAD_ITERATIONS,
     carried_loads,

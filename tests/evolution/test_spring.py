@@ -5,7 +5,7 @@ import pytest
 
 from tests.evolution import built, cylinder_depth_of, stepped
 from wearsim.errors import CapabilityError, ScenarioError
-from wearsim.evolution.state import fresh_state
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.steppers.loads import descents
 from wearsim.evolution.steppers.single_step import carried_loads, recovery_at, solve_at_record
 

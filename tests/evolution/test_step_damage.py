@@ -11,9 +11,9 @@ import pytest
 from tests.evolution import built
 from tests.evolution.test_fatigue import LAW, QUICK, fatigue
 from tests.evolution.test_step_loads import Line, with_loads
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.fatigue import damage_per_pass, effective_of_rows, layer_thickness
 from wearsim.evolution.quantities import Varying
-from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.damage import _load_nodes, with_damage
 from wearsim.evolution.steppers.loads import descents
 from wearsim.evolution.steppers.single_step import explicit_step, solve_present

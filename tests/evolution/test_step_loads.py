@@ -10,9 +10,8 @@ import pytest
 
 from tests.evolution import built
 from wearsim.errors import StepError
-from wearsim.evolution.contacts import LEAST_LOAD as NEXT_TO_A_PAUSE
+from wearsim.evolution.contacts import LEAST_LOAD as NEXT_TO_A_PAUSE, fresh_state
 from wearsim.evolution.quantities import Varying
-from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.conditions import conditions_of
 from wearsim.evolution.steppers.implicit import ImplicitStepper
 from wearsim.evolution.steppers.load_errors import (

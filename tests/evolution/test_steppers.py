@@ -8,11 +8,10 @@ import pytest
 
 from tests.evolution import built, cylinder_depth_of, cylinder_volume_of, never, next_state, stepped
 from wearsim.errors import SolverError, StepError
-from wearsim.evolution.contacts import unworn_contacts
+from wearsim.evolution.contacts import fresh_state, unworn_contacts
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.observables import centroid
 from wearsim.evolution.quantities import oscillation
-from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.base import Attempt
 from wearsim.evolution.steppers.edges import unresolved
 from wearsim.evolution.steppers.forward_euler import ExplicitStepper, stability_limit

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import wearsim
-from wearsim.evolution.state import fresh_state
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.strip_errors import Course, sizes_of, strip_errors
 from wearsim.studies.run.assemble import assemble_problem
 from wearsim.studies.run.draws import draw

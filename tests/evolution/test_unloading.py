@@ -8,7 +8,7 @@ import pytest
 import wearsim
 from tests.evolution import SCENARIOS, built, cylinder_depth_of, cylinder_volume_of, stepped
 from wearsim.errors import SolverError
-from wearsim.evolution.state import fresh_state
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.steppers.single_step import solve_at_record, solve_present
 
 KIK_PIOTROWSKI = {"contact.model": "semi-hertzian", "contact.variant": "kik-piotrowski"}

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tests.evolution import built
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.error_estimates import MOST_ADHERING, variation_bias
-from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.single_step import carried_loads, energy_per_pass
 
 #: of the rollers in their slack; that of the scenario makes all of a contact slip

@@ -11,8 +11,8 @@ from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.mechanics.hertz.ellipse import hertz
 from wearsim.models.contact.hertz import SPEC, HertzModel, Patch, strips_over_patch
 from wearsim.models.contact.hertz_fastsim import HertzFastsim, HertzFastsimOptions
+from wearsim.models.contact.strip_model import tangential_theory
 from wearsim.models.tangential.base import EllipseStrips
-from wearsim.models.tangential.strip_theory import tangential_theory
 from wearsim.types import Creepage, Grid, OperatingPoint
 
 MATERIALS = (STEEL, STEEL)

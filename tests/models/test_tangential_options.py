@@ -4,8 +4,9 @@ import pytest
 from pydantic import ValidationError
 
 from wearsim.errors import ScenarioError
+from wearsim.models.contact.strip_model import TangentialOptions, tangential_theory
 from wearsim.models.tangential.fastsim import FastripTheory, FastsimTheory
-from wearsim.models.tangential.strip_theory import StripTheory, TangentialOptions, tangential_theory
+from wearsim.models.tangential.strip_theory import StripTheory
 from wearsim.scenario import parse_scenario
 
 RIG = """

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.integrate import evolve
-from wearsim.evolution.state import fresh_state
 from wearsim.scenario import load_scenario
 from wearsim.studies.run.assemble import assemble_problem
 from wearsim.studies.run.draws import draw

@@ -1,4 +1,4 @@
-"""Contacts of a wear problem as a batch."""
+"""Contacts of a wear problem as a batch, and its state before the first pass."""
 
 from __future__ import annotations
 
@@ -8,8 +8,11 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from wearsim.contact_batch import ContactBatch
+from wearsim.contact_batch import ContactBatch, ContactBatchSolution
+from wearsim.errors import CapabilityError
+from wearsim.evolution.fatigue import fresh_damage
 from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.state import HERTZ, WearState
 from wearsim.mechanics.numerics.jit import kernel_input
 from wearsim.types import FloatArray, IntArray
 
@@ -108,6 +111,55 @@ def unworn_contacts(problem: WearProblem) -> ContactBatch:
     loads = np.broadcast_to(force + problem.inputs.normal_force_offset, problem.shape)
     cylinder, roller = np.zeros((1, 1, 1, 1)), np.zeros((1, problem.rollers, 1, 1))
     return contact_batch(problem, problem.nominal_gap, loads, cylinder, roller)
+
+
+def fresh_state(problem: WearProblem) -> WearState:
+    """Return the state before the first pass, with the contacts of the unworn bodies solved."""
+    stations, contacts, realisations = problem.shape
+    zeros, counts = np.zeros(realisations), np.zeros(realisations, dtype=np.int64)
+    problem = problem.at_time(zeros, zeros)
+    n, solved = problem.grid.strips, problem.model.solve(unworn_contacts(problem))
+    damage = fresh_damage(problem, solved) if problem.fatigue else (None, None)
+    return WearState(
+        passes=zeros,
+        cylinder_depth=np.zeros((stations, 1, realisations, n)),
+        roller_depth=np.zeros((1, problem.rollers, realisations, n)),
+        terms=np.zeros((len(problem.terms), problem.rollers, realisations)),
+        contacts=solved,
+        energy=zeros,
+        depth_error=zeros,
+        volume_error=zeros,
+        profile_error=zeros,
+        quadrature=np.zeros((3, realisations)),
+        scatter=np.zeros((3, realisations)),
+        step=zeros,
+        steps=counts,
+        rejected=counts,
+        solves=counts + stations * contacts,
+        full_solves=counts,
+        approach_factor=_approach_factor(problem, solved) if problem.has_spring else None,
+        damage=damage[0],
+        damage_points=damage[1],
+    )
+
+
+def _approach_factor(problem: WearProblem, contacts: ContactBatchSolution) -> FloatArray:
+    """Return `approach_factor` of a state, from the contacts of the unworn bodies at the start."""
+    force = problem.force(np.zeros(len(problem.loads)))
+    batch = unworn_contacts(problem)
+    if problem.pauses:
+        # a test may start in a pause; a small contact would be resolved by too few strips
+        force = np.maximum(force, problem.greatest_load) + problem.inputs.normal_force_offset
+        batch = replace(batch, normal_force=np.broadcast_to(force, problem.shape).ravel())
+        contacts = problem.model.solve(batch, warm=contacts)
+    approach = problem.values_of(contacts, "approach") - problem.nominal_gap.min(axis=-1)
+    if not np.isfinite(approach).all():
+        raise CapabilityError(
+            f"{type(problem.model).__name__} returns an approach that is not finite, and a load"
+            " with a stiffness depends on it; choose another contact.model, or a load without"
+            " stiffness"
+        )
+    return problem.per_roller(approach / batch.normal_force.reshape(problem.shape) ** HERTZ)
 
 
 def _creepage_variation(

@@ -21,7 +21,6 @@ from wearsim.evolution.quantities import (
     sum_in_order,
     values_between,
 )
-from wearsim.mechanics.numerics.jit import own_array
 from wearsim.plugins import BODIES, Body, ContactModel, Load, LoadTerm, WearLaw
 from wearsim.types import BoolArray, FloatArray, Grid, IntArray
 
@@ -265,7 +264,7 @@ class WearProblem:
         if self.free:
             columns |= self.kinematics.track.free_rolling(self.inputs)
         filled: dict[str, Any] = {
-            n: own_array(np.broadcast_to(c, self.shape)).ravel() for n, c in columns.items()
+            n: np.broadcast_to(c, self.shape).flatten() for n, c in columns.items()
         }
         shape = (*self.shape, self.grid.strips)
         return ContactBatch(

@@ -12,9 +12,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import CamStations
-from wearsim.evolution.state import WearState, fresh_state
+from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.loads import displacement_at
 from wearsim.evolution.steppers.single_step import recovery_at, solve_at_record
 from wearsim.evolution.strips import with_surfaces

@@ -27,10 +27,11 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.integrate import Advance, Evolution
 from wearsim.evolution.observables import greatest_between
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import WearState, fresh_state
+from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.loads import elastic_approaches
 from wearsim.evolution.steppers.single_step import volumes_of

@@ -1,8 +1,7 @@
-"""Building of plugins, and checks of the values that they return."""
+"""Checks of the values that plugins return."""
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable
 from numbers import Real
 from typing import Any, ClassVar, TypeVar
@@ -10,10 +9,9 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 
 from wearsim.errors import PluginError, SolverError
-from wearsim.plugins.manager import registry
+from wearsim.plugins.manager import described_value, registry
 from wearsim.plugins.specs import Spec
 
-Built = TypeVar("Built")
 T = TypeVar("T")
 ROUNDING = 1e-9  # of the greatest value: a negative one that is no error of a plugin
 
@@ -116,78 +114,6 @@ class Checked:
         return f"correct the plugin, which {tests} of wearsim.testing checks"
 
 
-def built_plugin(
-    spec: Any, expected: type[Any], checked: Callable[[Any, str], Built], *arguments: Any
-) -> Built:
-    """Return what the factory of a plugin builds, with checks of its values if it is third-party.
-
-    Parameters
-    ----------
-    spec : Spec
-        With a factory.
-    expected : type
-        Class of which the factory must return an object.
-    checked : callable
-        Returns the object with checks, from the object and the name of the plugin.
-    *arguments
-        Arguments of the factory.
-
-    Raises
-    ------
-    PluginError
-        If the factory returns an object of another class.
-    """
-    try:
-        built = spec.factory(*arguments)
-    except TypeError as error:
-        if error.__traceback__ is not None and error.__traceback__.tb_next is not None:
-            raise  # of a line in the factory
-        raise PluginError(
-            f"the factory of {spec.kind} '{spec.name}' cannot be called: {error}"
-        ) from error
-    if not isinstance(built, expected):
-        raise PluginError(
-            f"the factory of {spec.kind} '{spec.name}' returned {described_value(built)}, expected"
-            f" a {expected.__name__}"
-        )
-    own: Built = built
-    of_wearsim = [
-        base for base in type(built).__mro__ if base.__module__.partition(".")[0] == "wearsim"
-    ]
-    if type(built) in of_wearsim:
-        return own
-    for base in of_wearsim:
-        _refuse_other_arguments(spec, built, base)
-    return checked(built, spec.name)
-
-
-def _refuse_other_arguments(spec: Any, built: object, base: type[Any]) -> None:
-    """Raise a PluginError if a required method does not take the arguments of its base class."""
-    for name in sorted(getattr(base, "__abstractmethods__", ())):
-        required = getattr(base, name)
-        if not callable(required):
-            continue  # a property
-        wanted, own = inspect.signature(required), getattr(built, name)
-        given = [item for item in wanted.parameters.values() if item.name != "self"]
-        try:
-            inspect.signature(own).bind(*given)
-        except TypeError as error:
-            taken = ", ".join(map(str, inspect.signature(own).parameters))
-            raise PluginError(
-                f"{name} of {spec.kind} '{spec.name}' takes ({taken}), expected"
-                f" ({', '.join(item.name for item in given)})"
-            ) from error
-        except ValueError:  # a compiled function without a signature
-            pass
-
-
 def is_numeric(value: object) -> bool:
     """Return whether a value is a real number or an array of such numbers."""
     return isinstance(value, Real) or (isinstance(value, np.ndarray) and value.dtype.kind in "fiu")
-
-
-def described_value(value: object) -> str:
-    """Return a value that was returned, as the object of a sentence."""
-    if isinstance(value, np.ndarray):
-        return f"an array of the shape {value.shape} and type {value.dtype}"
-    return repr(value) if value is None or isinstance(value, Real) else f"a {type(value).__name__}"

@@ -6,7 +6,7 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatch, ContactBatchSolution, SharedWear
 from wearsim.errors import ContactError, PluginError
-from wearsim.plugins.checked import ROUNDING, described_value, is_numeric
+from wearsim.plugins.checked import ROUNDING, is_numeric
 from wearsim.plugins.contact_model import (
     ContactModel,
     PassLoop,
@@ -14,6 +14,7 @@ from wearsim.plugins.contact_model import (
     naming_contact,
     refuse_unclaimed,
 )
+from wearsim.plugins.manager import described_value
 from wearsim.types import (
     ContactFields,
     ContactSolution,

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from wearsim.plugins.checked import Checked, built_plugin, is_numeric
+from wearsim.plugins.checked import Checked, is_numeric
+from wearsim.plugins.manager import built_plugin
 from wearsim.plugins.specs import (
     Distribution,
     FrictionField,

@@ -29,33 +29,36 @@ class AxialGap:
         Width of the roller [m].
     greatest : float
         Drop beyond which nothing is of interest, the radius of the roller [m].
+
+    Attributes
+    ----------
+    crown_radius : float or None
+        Relative crown radius of circular crowns, infinite for straight bodies [m].
+    is_crowned : bool
+        Whether the gap is a parabola, as contact models for ellipses need it.
+    has_crowned_cylinder : bool
+        Whether the cylinder is not straight.
+    apex_share : float
+        Position of a contact of unworn bodies over the offset of its roller, without tilt.
+    roller_drop : callable
+        Drop of the roller at axial distances from its apex [m].
     """
 
     def __init__(
         self, roller: AxialProfile, cylinder: AxialProfile, width: float | None, greatest: float
     ) -> None:
-        self._roller, self._cylinder = roller, cylinder
+        self._cylinder, self._length, self.roller_drop = cylinder, roller.length, roller.drop
         self._half = 0.5 * width if width else math.inf
-        self._greatest = greatest
-
-    @cached_property
-    def crown_radius(self) -> float | None:
-        """Relative crown radius of circular crowns, infinite for straight bodies [m]."""
-        radii = self._roller.crown_radius, self._cylinder.crown_radius
-        if radii[0] is None or radii[1] is None:
-            return None
-        if math.isinf(radii[1]):
-            return radii[0]
-        return 1.0 / sum(1.0 / radius for radius in radii if radius is not None)
-
-    @cached_property
-    def is_crowned(self) -> bool:
-        """Whether the gap is a parabola, as contact models for ellipses need it."""
-        return self.crown_radius is not None and math.isfinite(self.crown_radius)
-
-    def roller_drop(self, s: FloatArray) -> FloatArray:
-        """Return the drop of the roller at axial distances from its apex [m]."""
-        return self._roller.drop(s)
+        self._greatest, self.apex_share = greatest, 1.0
+        crown, other = roller.crown_radius, cylinder.crown_radius
+        self.crown_radius: float | None = crown
+        self.has_crowned_cylinder = other != math.inf
+        if crown is None or other is None:
+            self.crown_radius = None
+        elif self.has_crowned_cylinder:
+            self.crown_radius = 1.0 / (1.0 / crown + 1.0 / other)
+            self.apex_share = self.crown_radius / crown
+        self.is_crowned = self.crown_radius is not None and math.isfinite(self.crown_radius)
 
     def cylinder_drop(self, y: FloatArray) -> FloatArray:
         """Return the drop of the cylinder at axial positions [m]; beyond its ends it is great."""
@@ -68,21 +71,9 @@ class AxialGap:
             np.abs(y) > half, self._greatest, self._cylinder.drop(np.clip(y, -half, half))
         )
 
-    @cached_property
-    def has_crowned_cylinder(self) -> bool:
-        """Whether the cylinder is not straight."""
-        return self._cylinder.crown_radius != math.inf
-
-    def apexes(self, offset: FloatArray) -> FloatArray:
-        """Return the positions of the contacts of rollers with an offset, without tilt [m]."""
-        radius, crown = self.crown_radius, self._roller.crown_radius
-        if not self.has_crowned_cylinder or not self.is_crowned or not radius or not crown:
-            return offset
-        return np.asarray(offset * (radius / crown))
-
     def drop(self, s: FloatArray) -> FloatArray:
         """Return the gap of the bodies at an axial distance from their coinciding apexes [m]."""
-        return self._roller.drop(s) + self.cylinder_drop(s)
+        return self.roller_drop(s) + self.cylinder_drop(s)
 
     def half_width(self, depth: FloatArray | float) -> FloatArray:
         """Return the half-width of a conformal groove of a depth, at most half the roller [m].
@@ -155,7 +146,7 @@ class AxialGap:
 
         On each side the lower of both drops counts, so that grooves are not too narrow.
         """
-        most = min(self._half, 0.5 * self._roller.length)
+        most = min(self._half, 0.5 * self._length)
         if math.isinf(most):
             most = _FIRST
             while most < _LONGEST and self._lower(np.array([most]))[0] < self._greatest:

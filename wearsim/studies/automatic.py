@@ -28,7 +28,6 @@ from wearsim.studies.contact.estimate import (
     preference,
 )
 from wearsim.studies.run.assemble import build_problem, chosen_stepper, prepared_model
-from wearsim.studies.run.draws import draw
 from wearsim.studies.run.grid import contact_grid, wider_grid
 from wearsim.studies.run.in_progress import RunInProgress
 from wearsim.studies.run.recorder import Event, Stepped
@@ -240,7 +239,7 @@ def _looked_at(scenario: Scenario, test: bool) -> tuple[list[_State], str]:
 
     mean = replace(scout, evolution=evolution)
     try:
-        run = RunInProgress(mean, draw(mean), None, DISK, watch, None)
+        run = RunInProgress(mean, None, DISK, watch, None)
         problem = run.problem
         states = [_state(scout, problem.grid, unworn_contacts(problem))]
         run.finish()

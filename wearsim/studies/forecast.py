@@ -24,10 +24,10 @@ from typing import TypeAlias
 import numpy as np
 
 from wearsim.errors import SolverError
-from wearsim.evolution.contacts import unworn_contacts
+from wearsim.evolution.contacts import fresh_state, unworn_contacts
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import CamStations
-from wearsim.evolution.state import WearState, fresh_state
+from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.loads import fresh_approach, with_feedback
 from wearsim.evolution.steppers.single_step import solve_loaded, solve_present
 from wearsim.evolution.strips import on_grid

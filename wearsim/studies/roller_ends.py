@@ -16,15 +16,6 @@ LEAST_PER_EDGE = 3  # with fewer there is a warning
 MOST_STRIPS_PER_ROLLER = 241  # chosen for an edge
 
 
-def ends_roller(scenario: Scenario, low: float, high: float) -> bool:
-    """Return whether strips from `low` to `high` [m] contain an end of a roller."""
-    if scenario.roller.width is None:
-        return False
-    offsets = np.array(scenario.per_roller(scenario.roller.offset))
-    half = 0.5 * scenario.roller.width
-    return bool(low < offsets.min() - half or high > offsets.max() + half)
-
-
 def width_between_edges(scenario: Scenario) -> float:
     """Return the width of a roller without its rounded or cut edges [m]; infinite if not given."""
     roller = scenario.roller

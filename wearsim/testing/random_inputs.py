@@ -16,7 +16,7 @@ from wearsim.plugins import (
     RandomInputSpec,
     Uniforms,
 )
-from wearsim.plugins.checked import described_value
+from wearsim.plugins.manager import described_value
 from wearsim.testing.checks import (
     Checks,
     ConfiguredSpec,

@@ -16,7 +16,7 @@ from tests.benchmarks.wear_tests import SCENARIOS
 from wearsim import load_scenario
 from wearsim.errors import ContactError, PluginError
 from wearsim.models.contact import slender
-from wearsim.models.tangential.strip_theory import TangentialOptions
+from wearsim.models.contact.strip_model import TangentialOptions
 from wearsim.plugins import ContactModelSpec, manager, registry
 from wearsim.studies.run.draws import draw
 from wearsim.studies.run.grid import strips_of_run

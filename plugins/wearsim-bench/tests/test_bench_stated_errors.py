@@ -8,8 +8,8 @@ import pytest
 
 import wearsim
 from wearsim.errors import ResultsFileError, SolverError
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.integrate import evolve
-from wearsim.evolution.state import fresh_state
 from wearsim.plugins import BODIES
 from wearsim.types import Grid
 from wearsim_bench.figures.stated_errors import stated_errors_figure

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from tests.evolution import built, stepped
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.error_estimates import volume_of
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import WearState, fresh_state
+from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.implicit import ImplicitStepper, implicit_step
 from wearsim.evolution.steppers.single_step import carried_loads, solve_present, wear_per_pass
 

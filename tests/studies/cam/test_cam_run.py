@@ -13,7 +13,7 @@ from cam_text import cam, prescribed
 
 import wearsim
 from tests.report.drawn import run_figure as cam_run_figure
-from wearsim.evolution.state import fresh_state
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.steppers.single_step import explicit_step
 from wearsim.mechanics.cam.stations import NUMBERS
 from wearsim.studies.cam.turn import turn_of

@@ -8,9 +8,8 @@ from cam_text import SCENARIOS
 
 import wearsim
 from wearsim.errors import Interrupted
-from wearsim.evolution.contacts import contact_batch
+from wearsim.evolution.contacts import contact_batch, fresh_state
 from wearsim.evolution.relocation import moved_depth, relocated
-from wearsim.evolution.state import fresh_state
 from wearsim.studies.cam.turn import CamTurn
 from wearsim.studies.effort import restarts_of
 from wearsim.studies.run.assemble import assemble_problem

@@ -7,8 +7,8 @@ import pytest
 
 from tests.evolution import never
 from tests.studies.random_examples import CREEPAGE, FRICTION, LOAD, SLACK, WANDERING, scenario_of
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.integrate import evolve
-from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.stabilised import StabilisedStepper
 from wearsim.studies.ensemble import realisation
 from wearsim.studies.ensemble.batch import RealisationRun, batch_groups, observe

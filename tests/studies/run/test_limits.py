@@ -12,9 +12,10 @@ from study_examples import LOADS, ROLLERS, STEPPERS, after, run_differences, run
 
 from tests.evolution import SCENARIOS
 from wearsim.errors import Interrupted, ResultsFileError
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.integrate import Evolution
 from wearsim.evolution.limits import Limit
-from wearsim.evolution.state import WearState, fresh_state
+from wearsim.evolution.state import WearState
 from wearsim.scenario import load_scenario
 from wearsim.studies.ensemble.batch import joined_problem
 from wearsim.studies.opening import open_results

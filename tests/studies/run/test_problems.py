@@ -6,7 +6,7 @@ import pytest
 import wearsim
 from tests.studies.random_examples import LOAD, WANDERING, scenario_of
 from wearsim.errors import Interrupted
-from wearsim.evolution.state import fresh_state
+from wearsim.evolution.contacts import fresh_state
 from wearsim.models.random.varying import OrnsteinUhlenbeck
 from wearsim.studies.run.assemble import build_problem, prepared_model
 from wearsim.studies.run.draws import draw

@@ -7,8 +7,8 @@ import wearsim
 from tests.evolution import SCENARIOS
 from tests.studies.random_examples import scenario_of
 from tests.studies.run.quadrature_study import errors as quadrature_errors, statistics
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.error_estimates import half_quadrature, volume_of
-from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.single_step import explicit_step
 from wearsim.studies.run.assemble import assemble_problem
 from wearsim.studies.run.draws import draw

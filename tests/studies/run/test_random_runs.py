@@ -17,9 +17,9 @@ from tests.studies.random_examples import (
 )
 from wearsim.errors import CapabilityError, Interrupted, ScenarioError, StepError
 from wearsim.evolution import error_estimates as errors_of_steps
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.error_estimates import volume_of
 from wearsim.evolution.integrate import evolve
-from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.forward_euler import stability_limit
 from wearsim.studies.opening import open_results
 from wearsim.studies.run.assemble import assemble_problem

@@ -103,14 +103,14 @@ def test_file_written_while_resume_reads_it_is_not_replaced(
 ) -> None:
     with pytest.raises(Interrupted):
         studies.run(short(), path, stop_requested=lambda: True)
-    draw = studies.draw
+    with_end = studies.with_end
 
     def meanwhile(*arguments: object) -> object:
-        monkeypatch.setattr(studies, "draw", draw)
+        monkeypatch.setattr(studies, "with_end", with_end)
         studies.resume(path)
-        return draw(*arguments)
+        return with_end(*arguments)
 
-    monkeypatch.setattr(studies, "draw", meanwhile)
+    monkeypatch.setattr(studies, "with_end", meanwhile)
     with pytest.raises(ResultsFileError, match=BUSY):
         studies.resume(path)
     assert open_results(path).finished

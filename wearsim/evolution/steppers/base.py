@@ -146,6 +146,7 @@ class Attempt:
     warning: str | None = None
 
 
+@dataclass(eq=False)
 class Stepper(ABC):
     """Time integration scheme; a step depends on nothing but problem and `WearState`.
 
@@ -157,6 +158,9 @@ class Stepper(ABC):
         Passes per step, instead of the step-size control.
     """
 
+    tolerance: float
+    forced_step: float | None = None
+
     #: whether every pass is a step: the run then stops at every record, and the number of steps
     #: does not depend on the records
     pass_by_pass = False
@@ -164,9 +168,6 @@ class Stepper(ABC):
     taper = 1.0
     #: order of the scheme: a step adds an error that grows as the step to the power order + 1
     order = 1
-
-    def __init__(self, tolerance: float, forced_step: float | None = None) -> None:
-        self.tolerance, self.forced_step = tolerance, forced_step
 
     def started(self, problem: WearProblem, state: WearState) -> WearState:
         """Return the state from which the integration starts."""

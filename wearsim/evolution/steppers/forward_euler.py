@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from wearsim.errors import ContactError, StepError
@@ -113,6 +115,7 @@ SAFETY = 0.5  # part of the stability limit that a step may take
 OSCILLATING = 0.1  # second difference of the line load, relative to its peak, that gives a warning
 
 
+@dataclass(eq=False)
 class ExplicitStepper(Stepper):
     """Stepper that applies the wear rate of the step's start to the whole step.
 
@@ -127,14 +130,7 @@ class ExplicitStepper(Stepper):
         Allow a forced step beyond the stability limit.
     """
 
-    def __init__(
-        self,
-        tolerance: float,
-        forced_step: float | None = None,
-        allow_unstable: bool = False,
-    ) -> None:
-        super().__init__(tolerance, forced_step)
-        self.allow_unstable = allow_unstable
+    allow_unstable: bool = False
 
     def proposed(self, problem: WearProblem, state: WearState) -> FloatArray:
         """Return the step of the step-size control, below the stability limit, or a forced step."""

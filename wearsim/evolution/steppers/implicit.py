@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -59,6 +60,7 @@ OF_STEPS, DOUBLED = (1.0, COVER[2]), (math.inf, COVER_OF_DOUBLING)
 LEAST_AIM_OF_ROWS = 0.7
 
 
+@dataclass(eq=False)
 class ImplicitStepper(StepDoublingStepper):
     """Stepper of order one to four that solves the contacts on the profiles at each step's end.
 
@@ -77,14 +79,10 @@ class ImplicitStepper(StepDoublingStepper):
         vary.
     """
 
+    by_doubling: bool | None = None
+
     taper = 2.0
     follows_trends = True
-
-    def __init__(
-        self, tolerance: float, forced_step: float | None = None, by_doubling: bool | None = None
-    ) -> None:
-        super().__init__(tolerance, forced_step)
-        self.by_doubling = by_doubling
 
     def started(self, problem: WearProblem, state: WearState) -> WearState:
         """Return the state with the rates and differences that the formulas need."""

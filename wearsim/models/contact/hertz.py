@@ -15,6 +15,7 @@ from wearsim.mechanics.hertz import parabola_fit
 from wearsim.mechanics.hertz.elasticity import ElasticPair, combine
 from wearsim.mechanics.hertz.ellipse import HertzContact, given_ellipse, hertz
 from wearsim.mechanics.hertz.patches import fit_within
+from wearsim.models.contact.strip_model import TangentialOptions, tangential_theory
 from wearsim.models.tangential.base import (
     EllipseStrips,
     Strips,
@@ -24,7 +25,6 @@ from wearsim.models.tangential.base import (
     local_slip,
     power_not_finite,
 )
-from wearsim.models.tangential.strip_theory import TangentialOptions, tangential_theory
 from wearsim.plugins import Capabilities, ContactModelSpec, Options, SingleContactModel
 from wearsim.quantities import PositiveLength
 from wearsim.types import (

@@ -18,13 +18,15 @@ from wearsim.mechanics.tangential.strip_interaction import strip_elasticity
 from wearsim.mechanics.tangential.strip_theory import SUMS
 from wearsim.models.contact.strip_model import (
     StripModel,
+    TangentialOptions,
     check_edges,
     grid_about_hertz,
     normal_failure,
+    tangential_theory,
 )
 from wearsim.models.contact.strip_tractions import strip_tractions
 from wearsim.models.tangential.base import TangentialTheory, power_not_finite
-from wearsim.models.tangential.strip_theory import StripTheory, TangentialOptions, tangential_theory
+from wearsim.models.tangential.strip_theory import StripTheory
 from wearsim.models.tangential.torque_balance import with_balanced_creepage
 from wearsim.plugins import (
     Capabilities,
@@ -271,7 +273,8 @@ class Slender(StripModel):
         Contacts with another theory have their normal problems solved in one call and their
         tangential problems one after another.
         """
-        refuse_unclaimed(self, batch, wear_compliance, coupling)
+        if batch.friction.ndim > 2:  # nothing else in a batch requires what it does not support
+            refuse_unclaimed(self, batch)
         normal = self._solve_normal(batch, wear_compliance, coupling, warm)
         shape = batch.gap.shape
         line_load, half_length = normal.line_load.reshape(shape), normal.half_length.reshape(shape)

@@ -1,4 +1,4 @@
-"""Contact models that solve loaded strips on any gap profile: their base, and semi-hertzian."""
+"""Contact models that solve loaded strips: their options, their base, and semi-hertzian."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from copy import copy
 from typing import Any, Literal, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, ValidationInfo, field_validator
 
 from wearsim.errors import ContactError
 from wearsim.mechanics.hertz.elasticity import ElasticPair, combine
@@ -28,8 +28,15 @@ from wearsim.models.tangential.base import (
     friction_per_strip,
     local_slip,
 )
-from wearsim.models.tangential.strip_theory import TangentialOptions, tangential_theory
-from wearsim.plugins import Capabilities, ContactModel, ContactModelSpec, SingleContactModel
+from wearsim.models.tangential.fastsim import FastripTheory, FastsimTheory
+from wearsim.models.tangential.strip_theory import StripTheory
+from wearsim.plugins import (
+    Capabilities,
+    ContactModel,
+    ContactModelSpec,
+    Options,
+    SingleContactModel,
+)
 from wearsim.types import (
     ContactFields,
     ContactSolution,
@@ -38,6 +45,7 @@ from wearsim.types import (
     Material,
     OperatingPoint,
 )
+from wearsim.units import QuantityError, as_written
 
 _WIDTH = 1.2  # width of the grid over that of the Hertzian patch
 _STRIPS = 121
@@ -47,11 +55,52 @@ _VARIANTS: dict[Variant, int] = {
     "ayasse-chollet": kernels.AYASSE_CHOLLET,
     "analyn": kernels.ANALYN,
 }
+# the theories that use each of the other options
+_USED_BY = {"mx": ("fastrip", "fastsim"), "bound": ("fastsim",), "flexibility": ("fastsim",)}
 _FAILURE = {
     TOO_FINE: f"a half-length exceeds {np.exp(HIGHEST):.0f} strip widths",
     NO_CONVERGENCE: "the contact and the gap that its wear opens did not converge",
     NOT_FINITE: "a value is not finite, or the load is not positive",
 }
+
+
+class TangentialOptions(Options):
+    """Options of contact models of strips that select the tangential theory."""
+
+    tangential: Literal["strip", "fastrip", "fastsim"] = Field(
+        "strip",
+        description="tangential theory: closed-form strips, a FaStrip march or a FASTSIM march",
+    )
+    mx: int = Field(50, ge=2, description="points along rolling of a FaStrip or FASTSIM march")
+    bound: Literal["parabolic", "elliptic"] = Field(
+        "elliptic", description="traction bound of a FASTSIM march"
+    )
+    flexibility: Literal["three", "one"] = Field(
+        "three",
+        description="flexibilities of a FASTSIM march: Kalker's three, or one weighted by creepage",
+    )
+
+    @field_validator(*_USED_BY)
+    @classmethod
+    def _is_used(cls, value: object, info: ValidationInfo) -> object:
+        """Refuse an option that the theory does not use; defaults are not validated."""
+        theory, users = info.data.get("tangential"), _USED_BY[str(info.field_name)]
+        if theory is not None and theory not in users:
+            raise QuantityError(
+                f'is not used with tangential = "{theory}"',
+                as_written(value),
+                "none of it, or " + " or ".join(f'tangential = "{user}"' for user in users),
+            )
+        return value
+
+
+def tangential_theory(options: TangentialOptions) -> TangentialTheory:
+    """Return the tangential theory that the options select."""
+    if options.tangential == "strip":
+        return StripTheory()
+    if options.tangential == "fastrip":
+        return FastripTheory(options.mx)
+    return FastsimTheory(options.bound, options.mx, flexibility=options.flexibility)
 
 
 class StripModel(ContactModel):

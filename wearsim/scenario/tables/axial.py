@@ -12,8 +12,8 @@ from pydantic import Field
 from wearsim.errors import ScenarioError
 from wearsim.mechanics.hertz.elasticity import ElasticPair, combine
 from wearsim.plugins import AxialPair, AxialProfile, AxialProfileSpec, Options, registry
-from wearsim.plugins.checked import built_plugin
 from wearsim.plugins.checked_laws import CheckedAxialProfile
+from wearsim.plugins.manager import built_plugin
 from wearsim.scenario.axial_gap import AxialGap
 from wearsim.scenario.parse.mistakes import Mistakes, key_of_file
 from wearsim.scenario.parse.random_inputs import choose, validate

@@ -20,8 +20,8 @@ from wearsim.mechanics.cam import (
     three_arc_cam,
 )
 from wearsim.plugins import MotionLaw, MotionLawSpec, Options
-from wearsim.plugins.checked import built_plugin
 from wearsim.plugins.checked_laws import CheckedMotionLaw
+from wearsim.plugins.manager import built_plugin
 from wearsim.quantities import Quantity
 from wearsim.scenario.parse.mistakes import Mistakes, split_keys, validate_options
 from wearsim.scenario.parse.random_inputs import validate

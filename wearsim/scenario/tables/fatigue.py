@@ -9,8 +9,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from wearsim.plugins import BODIES, Body, FatigueLaw, FatigueLawSpec, Options, registry
-from wearsim.plugins.checked import built_plugin
 from wearsim.plugins.checked_laws import CheckedFatigueLaw
+from wearsim.plugins.manager import built_plugin
 from wearsim.quantities import PositivePressure, Quantity
 from wearsim.scenario.parse.mistakes import Mistakes
 from wearsim.scenario.parse.random_inputs import choose, validate

@@ -24,10 +24,10 @@ from wearsim.plugins import (
     WearLawSpec,
     registry,
 )
-from wearsim.plugins.checked import built_plugin
 from wearsim.plugins.checked_laws import CheckedWearLaw
 from wearsim.plugins.checked_loads import CheckedLoad, CheckedLoadTerm
 from wearsim.plugins.checked_model import CheckedModel
+from wearsim.plugins.manager import built_plugin
 from wearsim.quantities import Length, PositiveLength
 from wearsim.scenario.parse.mistakes import Mistakes, installed, key_of_file, split_keys
 from wearsim.scenario.parse.random_inputs import choose, validate

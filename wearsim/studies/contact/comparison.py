@@ -11,8 +11,8 @@ import numpy as np
 from wearsim.contact_batch import ContactBatch
 from wearsim.errors import ContactError, PluginError, WearsimError
 from wearsim.plugins import ContactModel, ContactModelSpec, Options, registry
-from wearsim.plugins.checked import built_plugin
 from wearsim.plugins.checked_model import CheckedModel
+from wearsim.plugins.manager import built_plugin
 from wearsim.types import ContactSolution, FloatArray, Grid, Material, OperatingPoint
 
 REFERENCE = "halfspace"  # the exact theory

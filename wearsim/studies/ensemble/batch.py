@@ -10,13 +10,14 @@ from typing import TypeVar
 import numpy as np
 
 from wearsim.errors import StepError
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.error_estimates import greatest_depth
 from wearsim.evolution.integrate import Advance, Evolution, bisect_failures
 from wearsim.evolution.observables import depth_error_by_stations, volume_error_by_stations
 from wearsim.evolution.observed_errors import observed_errors
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import ContactInputs, sum_in_order
-from wearsim.evolution.state import WearState, fresh_state
+from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.implicit import ImplicitStepper
 from wearsim.evolution.strip_errors import (

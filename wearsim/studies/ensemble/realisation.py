@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wearsim.errors import SolverError, WearsimError, failure_text
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.integrate import Evolution
-from wearsim.evolution.state import fresh_state
 from wearsim.evolution.strips import averaged, same_strips
 from wearsim.mechanics.numerics.jit import not_cached, only_compiled
 from wearsim.plugins import BODIES, ContactModel
@@ -23,11 +23,11 @@ from wearsim.studies.ensemble.designs import BASE_PLANS, EnsemblePlan, parse_pla
 from wearsim.studies.ensemble.file.data import EnsembleData, Outcome
 from wearsim.studies.failures import explained
 from wearsim.studies.kernels import kernels_of
-from wearsim.studies.roller_ends import ends_roller
 from wearsim.studies.run.assemble import assemble_problem, prepared_model
 from wearsim.studies.run.draws import Drawer
 from wearsim.studies.run.grid import (
     check_number_of_strips,
+    ends_roller,
     lattice,
     shared_strips,
     start_of,

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.fatigue import effective_damage, greatest_damages
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import fresh_state
 from wearsim.mechanics.fatigue import ORTHOGONAL, greatest_von_mises
 from wearsim.report.text import count, shown
 from wearsim.scenario import Scenario

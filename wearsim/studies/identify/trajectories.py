@@ -20,11 +20,10 @@ from wearsim.studies.cam.cam_wear import Wanted, size_of, view_of
 from wearsim.studies.ensemble.batch import RealisationRun, batch_groups
 from wearsim.studies.ensemble.realisation import closed_form_depths
 from wearsim.studies.identify.wear_tests import ListedPasses, worn_at_records
-from wearsim.studies.run.assemble import assemble_problem, prepared_model
+from wearsim.studies.run.assemble import assemble_problem, prepared_model, start_height
 from wearsim.studies.run.draws import Drawer
 from wearsim.studies.run.grid import lattice, strips_of_run
 from wearsim.studies.run.setup import Setup
-from wearsim.studies.start.heights import start_height
 from wearsim.types import FloatArray, Grid
 
 CYLINDER, ROLLER = "wear.cylinder.k_over_h", "wear.roller.k_over_h"

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.integrate import Evolution, bisect_failures
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import WearState, fresh_state
+from wearsim.evolution.state import WearState
 from wearsim.evolution.strips import averaged, same_strips
 from wearsim.studies.cam.cam_wear import CylinderView, falls_of_lift
 from wearsim.studies.ensemble.batch import RealisationRun, joined_problem

@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 
 from wearsim.errors import StepError
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.error_estimates import greatest_depth
 from wearsim.evolution.fatigue import effective_damage
 from wearsim.evolution.integrate import Advance, Evolution, bisect_failures
@@ -30,7 +31,7 @@ from wearsim.evolution.observables import (
 )
 from wearsim.evolution.observed_errors import OF_EDGES, edge_peaks, relative_crown_radius
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import WearState, fresh_state
+from wearsim.evolution.state import WearState
 from wearsim.evolution.strip_errors import Course, add_observed, add_step
 from wearsim.studies.ensemble.batch import (
     Observables,

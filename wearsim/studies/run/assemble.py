@@ -10,11 +10,11 @@ from typing import TypeAlias
 import numpy as np
 
 from wearsim.errors import CapabilityError, Mistake, ScenarioError, mistake_in
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.error_estimates import half_quadrature, volume_of
 from wearsim.evolution.fatigue import Fatigue
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import ContactInputs, Kinematics
-from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.forward_euler import ExplicitStepper
 from wearsim.evolution.steppers.implicit import ImplicitStepper
@@ -29,7 +29,7 @@ from wearsim.studies.cam.stations import cam_stations
 from wearsim.studies.run.grid import check_number_of_strips, growth_of, strips_of_run
 from wearsim.studies.run.nodes import MAX_NODES, PassQuadrature, minimum_nodes, redrawing
 from wearsim.studies.run.setup import CylinderTurn, Setup
-from wearsim.studies.start.heights import roller_height, start_height
+from wearsim.studies.start.heights import roller_profile
 from wearsim.types import FloatArray, Grid
 from wearsim.units import in_engineers_unit
 
@@ -423,3 +423,46 @@ def surfaces(
         return Surfaces(gap, s, rolling, None)
     slip = drop / roller.radius + height / cylinder.radius
     return Surfaces(gap, s, rolling, slip if slip.ndim == 4 else slip[None])
+
+
+def start_height(scenario: Scenario, grid: Grid, angles: FloatArray | None = None) -> FloatArray:
+    """Return the height of the cylinder or the cam above nominal before wear.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    grid : Grid
+    angles : ndarray, shape (stations,), optional
+        Angles of a cam [rad].
+
+    Returns
+    -------
+    ndarray, shape (strips,), or (stations, strips) with angles
+        [m].
+    """
+    profile, surface = scenario.cylinder.profile, scenario.cylinder.start_surface
+    if surface is not None and angles is not None:
+        return surface.at(angles, grid.y)
+    height = (
+        np.zeros_like(grid.y) if profile is None else np.interp(grid.y, profile.y, profile.height)
+    )
+    return height if angles is None else np.broadcast_to(height, (len(angles), len(height)))
+
+
+def roller_height(scenario: Scenario, rollers: Sequence[int], s: FloatArray) -> FloatArray:
+    """Return the height of rollers with start profiles above nominal before wear [m].
+
+    Parameters
+    ----------
+    scenario : Scenario
+    rollers : sequence of int
+        Numbers of the rollers.
+    s : ndarray, shape (rollers, realisations, strips)
+        Axial distance from the apex [m].
+    """
+    height = np.empty_like(s)
+    for place, number in enumerate(rollers):
+        profile = roller_profile(scenario, number)
+        assert profile is not None
+        height[place] = np.interp(s[place], profile.y, profile.height)
+    return height

@@ -18,7 +18,6 @@ from wearsim.studies.plausibility import greatest_load
 from wearsim.studies.preparation import MOST_BYTES
 from wearsim.studies.roller_ends import (
     STRIPS_BEYOND,
-    ends_roller,
     roller_grid,
     strips_of_roller,
 )
@@ -44,6 +43,15 @@ STRIPS_OF_CONTACT_OF_FORM = 485  # where its ends are steep, for a peak pressure
 DRAWN = {"scalar", "joint"}  # roles of random inputs with a range
 _MARGIN = 1e-9  # of a patch, against rounding at the outer edges
 _ROUNDING = 1e-12
+
+
+def ends_roller(scenario: Scenario, low: float, high: float) -> bool:
+    """Return whether strips from `low` to `high` [m] contain an end of a roller."""
+    if scenario.roller.width is None:
+        return False
+    offsets = np.array(scenario.per_roller(scenario.roller.offset))
+    half = 0.5 * scenario.roller.width
+    return bool(low < offsets.min() - half or high > offsets.max() + half)
 
 
 def contact_grid(setup: Setup, load: float) -> Grid:
@@ -315,17 +323,17 @@ def growth_of(
         If the load is not defined for the whole test.
     """
     scenario, choice = setup.scenario, setup.scenario.contact
-    start = scenario.cylinder.start_surface
+    start, width = scenario.cylinder.start_surface, scenario.roller.width
     by_angle = start is not None and start.varies
     greatest = setup.greatest_load  # raises beyond a log
     coarse = partial(coarse_grid, scenario)
-    if choice.width is not None or ends_roller(scenario, *grid.edges):
+    if choice.width is not None or (width is not None and ends_roller(scenario, *grid.edges)):
         return (Growth(model, surfaces, coarse, 0, by_angle=by_angle),)
     at_once = STRIPS_OF_MANY_CONTACTS if setup.turn.varies else STRIPS_BEFORE_JOINING
     most = choice.strips or at_once
     last, changes = None, setup.varying or setup.passes or not scenario.load.built.constant
     margin = (0.5 * setup.patch.b if changes else 0.0) + setup.drawn_shift
-    if scenario.roller.width is not None:
+    if width is not None:
         last = roller_grid(scenario, strips_of_roller(scenario, STRIPS_AT_START, greatest))
     least = LEAST_LOADED if choice.strips is None else FEWEST_PER_HALF_WIDTH
     return (Growth(model, surfaces, coarse, most, margin, last, least, by_angle),)

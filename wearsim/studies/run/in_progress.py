@@ -13,6 +13,7 @@ import numpy as np
 
 from wearsim.atomic_write import Storage
 from wearsim.errors import Interrupted, ResultsFileError, SolverError, failure_text
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.limits import Limit
 from wearsim.evolution.observables import (
@@ -24,7 +25,7 @@ from wearsim.evolution.observed_errors import (
     relative_crown_radius,
 )
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import SIGMAS, WearState, fresh_state
+from wearsim.evolution.state import SIGMAS, WearState
 from wearsim.evolution.strip_errors import Course, coarse_courses, strip_errors
 from wearsim.evolution.strips import on_grid, same_strips
 from wearsim.plugins import ContactModelSpec, registry
@@ -40,9 +41,9 @@ from wearsim.studies.failures import (
 from wearsim.studies.plausibility import plausibility_warnings
 from wearsim.studies.preparation import changed_origins, origin_of
 from wearsim.studies.roller_ends import width_between_edges
-from wearsim.studies.run.assemble import assemble_problem, coarse_stepper
+from wearsim.studies.run.assemble import assemble_problem, coarse_stepper, start_height
 from wearsim.studies.run.continuation import earlier_warnings
-from wearsim.studies.run.draws import units_of
+from wearsim.studies.run.draws import draw, units_of
 from wearsim.studies.run.grid import start_of_run
 from wearsim.studies.run.recorder import (
     Checkpointed,
@@ -57,7 +58,6 @@ from wearsim.studies.run.recorder import (
 from wearsim.studies.run.result import Result, RunData
 from wearsim.studies.run.setup import Setup
 from wearsim.studies.schedule import RecordSchedule
-from wearsim.studies.start.heights import start_height
 from wearsim.types import FloatArray, Grid
 
 Watcher = Callable[[Event], None]
@@ -78,7 +78,6 @@ class RunInProgress:
     def __init__(
         self,
         scenario: Scenario,
-        setup: Setup,
         path: Path | None,
         storage: Storage,
         on_event: Watcher | None,
@@ -88,6 +87,7 @@ class RunInProgress:
         limit: Limit | None = None,
     ) -> None:
         self.limit, self.reached = limit, False
+        setup = draw(scenario) if scenario.random else Setup(scenario)
         self.start = grid = start_of_run(scenario, setup)
         if data is not None:
             grid = Grid(data.static["y"], float(data.checkpoint["spacing"]))
@@ -171,13 +171,6 @@ class RunInProgress:
             raise failure from error
         self.on_event(Finished(self._wall()))
         return Result(data, self.path)
-
-    def extended(
-        self, scenario: Scenario, setup: Setup, data: RunData, state: WearState
-    ) -> RunInProgress:
-        """Return the same run with a longer test."""
-        settings = self.path, self.storage, self.on_event, self.stop_requested
-        return RunInProgress(scenario, setup, *settings, data, state, self.limit)
 
     def end_before_limit(self, reason: str) -> Result:
         """Return the result of a run that does not reach its limit, with a warning."""

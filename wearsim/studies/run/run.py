@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from wearsim.results.io.outputs import output_lock
 from wearsim.results.kinds import kind_of
 from wearsim.scenario import Scenario
 from wearsim.scenario.parse.overrides import apply_overrides
+from wearsim.scenario.tables.plugin import AUTO
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.preparation import check_plugins
 from wearsim.studies.progress import shown_progress
@@ -31,7 +33,6 @@ from wearsim.studies.run.continuation import (
     without_limit_rows,
     written_value,
 )
-from wearsim.studies.run.draws import draw
 from wearsim.studies.run.in_progress import RunInProgress, Watcher
 from wearsim.studies.run.result import Result, read_results
 
@@ -93,7 +94,8 @@ def run(
     48.1 um
     >>> kept = wearsim.run("rig.toml", "rig.h5")  # writes the file as well
     """
-    scenario = with_chosen_model(scenario, test=True)
+    if not isinstance(scenario, Scenario) or scenario.contact.model == AUTO:
+        scenario = with_chosen_model(scenario, test=True)
     path = as_path(output) if output is not None else None
     limit, warnings = None, []
     if until is not None:
@@ -102,12 +104,12 @@ def run(
         scenario, limit = with_end(scenario, limit)
         warnings = limit_warnings(scenario, limit) if limit else []
     with (
-        output_lock(path, force, scenario.paths),
-        shown_progress(progress, "RunWatcher", on_event, scenario) as watch,
+        output_lock(path, force, scenario.paths) if path is not None else nullcontext(),
+        shown_progress(progress, "RunWatcher", on_event, scenario)
+        if progress
+        else nullcontext(on_event) as watch,
     ):
-        started = RunInProgress(
-            scenario, draw(scenario), path, storage, watch, stop_requested, limit=limit
-        )
+        started = RunInProgress(scenario, path, storage, watch, stop_requested, limit=limit)
         for text in warnings:
             started.warn(text)
         result = _run_to_limit(started)
@@ -188,13 +190,13 @@ def resume(
     at_end = not data.until and scenario.total_passes == float(state.passes[0])
     if data.finished and (reached or (at_end and limit is None)):
         return Result(data, path)
-    setup, data = draw(scenario), without_limit_rows(data, state)
+    data = without_limit_rows(data, state)
     with (
         write_lock(path, before),
         shown_progress(progress, "RunWatcher", on_event, scenario) as watch,
     ):
         return _run_to_limit(
-            RunInProgress(scenario, setup, path, storage, watch, stop_requested, data, state, limit)
+            RunInProgress(scenario, path, storage, watch, stop_requested, data, state, limit)
         )
 
 
@@ -217,7 +219,8 @@ def _run_to_limit(run: RunInProgress) -> Result:
         else:
             try:
                 scenario = stored_scenario(data, 2.0 * data.total_passes)
-                longer = run.extended(scenario, draw(scenario), data, state)
+                options = run.path, run.storage, run.on_event, run.stop_requested
+                longer = RunInProgress(scenario, *options, data, state, run.limit)
             except ScenarioError as error:
                 reason = "it cannot be extended: " + "; ".join(map(str, error.mistakes))
         if reason:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import zip_longest
 
 import numpy as np
 
@@ -13,13 +14,13 @@ from wearsim.evolution.quantities import OneStation, Varying
 from wearsim.mechanics.hertz.ellipse import HertzContact, hertz
 from wearsim.models.loads import FollowerLoad
 from wearsim.plugins import BODIES, JointDistribution, WearLaw
-from wearsim.scenario import RandomInput, Scenario
+from wearsim.scenario import RandomInput, Scenario, require_run
 from wearsim.scenario.axial_gap import AxialGap
 from wearsim.scenario.parse.fields import CONTACT_FIELDS
 from wearsim.studies.cam.point import Point
 from wearsim.studies.cam.turn import CamTurn, turn_of
 from wearsim.studies.run.inputs import load_mistake, origin
-from wearsim.studies.start.heights import StartExtent, roller_profile, start_extent
+from wearsim.studies.start.heights import StartExtent, start_extent
 from wearsim.types import ContactSolution, FloatArray
 
 _BISECTIONS = 40
@@ -78,6 +79,7 @@ class Setup:
     passes: tuple[RandomInput, ...] = ()
     values: Mapping[str, FloatArray] = field(default_factory=dict)
     time_means: Mapping[str, FloatArray] = field(default_factory=dict)
+    _patches: dict[tuple[float, float], HertzContact] = field(default_factory=dict, init=False)
 
     def greatest_mean(self, name: str, mean: float) -> float:
         """Return the greatest mean absolute value of an input of a contact over the whole test.
@@ -166,13 +168,15 @@ class Setup:
     def kinds(self) -> list[tuple[object, ...]]:
         """Offset, yaw, tilt and start profile of each roller; equal rows are merged."""
         columns = [self.inputs[name][:, 0].tolist() for name in ("offset", "yaw", "tilt")]
-        numbers = range(self.scenario.operation.rollers)
-        profiles = [roller_profile(self.scenario, number) for number in numbers]
-        return list(zip(*columns, profiles, strict=True))
+        profiles = self.scenario.roller.profiles or (None,)  # the last one is that of the others
+        return list(zip_longest(*columns, profiles, fillvalue=profiles[-1]))
 
     @cached_property
     def start_extent(self) -> StartExtent | None:
         """Extent of the start profiles, None if there is none."""
+        cylinder, roller = self.scenario.cylinder, self.scenario.roller
+        if cylinder.profile is None and cylinder.start_surface is None and not roller.profiles:
+            return None
         return start_extent(self.scenario, self.inputs["offset"][:, 0].tolist())
 
     @cached_property
@@ -189,7 +193,7 @@ class Setup:
     def load_range(self, stop: float | None = None) -> tuple[float, float]:
         """Return the least and greatest load up to `stop` [s], before any feedback [N].
 
-        By default it is that of the whole test.
+        By default it is that of the whole test, which the scenario must define.
 
         Raises
         ------
@@ -197,7 +201,9 @@ class Setup:
             If the load is not defined for the whole time, or is not positive outside of pauses.
         """
         scenario, load = self.scenario, self.scenario.load.built
-        stop = scenario.total_time if stop is None else stop
+        if stop is None:
+            require_run(scenario)
+            stop = scenario.total_time
         if isinstance(load, FollowerLoad):
             low, high = turn_of(scenario).normal_range
             return (low if low > 0.0 else high), high  # where N changes sign, the flank changes
@@ -284,10 +290,9 @@ class Setup:
         inputs : mapping of str to ndarray
             Among them offset [m] and tilt [rad], see `inputs`.
         """
-        shift = (
-            self.tilt_shift(inputs["tilt"]) if self.scenario.creepage.tilt_shifts_contact else 0.0
-        )
-        return np.asarray(self.scenario.axial_gap.apexes(inputs["offset"]) + shift)
+        shifts = self.scenario.creepage.tilt_shifts_contact and inputs["tilt"].any()
+        shift = self.tilt_shift(inputs["tilt"]) if shifts else 0.0
+        return np.asarray(inputs["offset"] * self.scenario.axial_gap.apex_share + shift)
 
     def centre_of(self, positions: FloatArray) -> float:
         """Return the middle of the strips for contact positions [m]."""
@@ -299,10 +304,6 @@ class Setup:
         gap = self.scenario.axial_gap
         half = 0.0 if gap.is_crowned else self.widest_patch(self.load_range(0.0)[1]).b
         return gap.shift(np.asarray(tilt, dtype=np.float64), half)
-
-    @cached_property
-    def _patches(self) -> dict[tuple[float, float], HertzContact]:
-        return {}
 
     def fresh_patch(self, load: float, curvature: float | None = None) -> HertzContact:
         """Return the patch of the unworn bodies under `load` [N] after Hertz.

@@ -13,11 +13,11 @@ from wearsim.report.csv_files import path_in_folder, write_files
 from wearsim.scenario import Scenario
 from wearsim.scenario.parse.overrides import apply_overrides, flat
 from wearsim.scenario.parse.toml import parse_toml
-from wearsim.studies.run.assemble import merged_rollers
+from wearsim.studies.run.assemble import merged_rollers, start_height
 from wearsim.studies.run.continuation import stored_scenario
 from wearsim.studies.run.draws import draw
 from wearsim.studies.run.result import Result, RunData
-from wearsim.studies.start.heights import roller_profile, start_height
+from wearsim.studies.start.heights import roller_profile
 from wearsim.types import FloatArray, Grid, Profile
 
 _OF_PROFILES = ("columns", "units", "row", "mean_rows", "at", "filter")

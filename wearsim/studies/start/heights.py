@@ -1,14 +1,14 @@
-"""Heights of the bodies above their nominal shapes at the start of a test."""
+"""Start profiles of the bodies: their extent, and heights between strips."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 
 from wearsim.scenario import Scenario
-from wearsim.types import FloatArray, Grid, Profile
+from wearsim.types import FloatArray, Profile
 
 
 class StartExtent(NamedTuple):
@@ -27,15 +27,13 @@ class StartExtent(NamedTuple):
     relief: float
 
 
-def start_extent(scenario: Scenario, offsets: Iterable[float]) -> StartExtent | None:
-    """Return the extent of the start profiles, or None if there is none; offsets of rollers [m]."""
+def start_extent(scenario: Scenario, offsets: Iterable[float]) -> StartExtent:
+    """Return the extent of the start profiles, of which there is one; offsets of rollers [m]."""
     cylinder = scenario.cylinder
     bodies = [body for body in (cylinder.profile, cylinder.start_surface) if body is not None]
     rollers = ((roller_profile(scenario, number), end) for number, end in enumerate(offsets))
     ends = [(body.y, 0.0) for body in bodies]
     ends += [(profile.y, offset) for profile, offset in rollers if profile is not None]
-    if not ends:
-        return None
     return StartExtent(
         min(float(y[0]) + offset for y, offset in ends),
         max(float(y[-1]) + offset for y, offset in ends),
@@ -48,49 +46,6 @@ def roller_profile(scenario: Scenario, number: int) -> Profile | None:
     """Return the start profile of a roller by its number."""
     profiles = scenario.roller.profiles
     return profiles[min(number, len(profiles) - 1)] if profiles else None
-
-
-def start_height(scenario: Scenario, grid: Grid, angles: FloatArray | None = None) -> FloatArray:
-    """Return the height of the cylinder or the cam above nominal before wear.
-
-    Parameters
-    ----------
-    scenario : Scenario
-    grid : Grid
-    angles : ndarray, shape (stations,), optional
-        Angles of a cam [rad].
-
-    Returns
-    -------
-    ndarray, shape (strips,), or (stations, strips) with angles
-        [m].
-    """
-    profile, surface = scenario.cylinder.profile, scenario.cylinder.start_surface
-    if surface is not None and angles is not None:
-        return surface.at(angles, grid.y)
-    height = (
-        np.zeros_like(grid.y) if profile is None else np.interp(grid.y, profile.y, profile.height)
-    )
-    return height if angles is None else np.broadcast_to(height, (len(angles), len(height)))
-
-
-def roller_height(scenario: Scenario, rollers: Sequence[int], s: FloatArray) -> FloatArray:
-    """Return the height of rollers with start profiles above nominal before wear [m].
-
-    Parameters
-    ----------
-    scenario : Scenario
-    rollers : sequence of int
-        Numbers of the rollers.
-    s : ndarray, shape (rollers, realisations, strips)
-        Axial distance from the apex [m].
-    """
-    height = np.empty_like(s)
-    for place, number in enumerate(rollers):
-        profile = roller_profile(scenario, number)
-        assert profile is not None
-        height[place] = np.interp(s[place], profile.y, profile.height)
-    return height
 
 
 def excess_between_strips(values: FloatArray) -> float:

@@ -9,7 +9,7 @@ from typing import Any, Literal, Union, get_args, get_origin
 
 import numpy as np
 
-from wearsim.models.tangential.strip_theory import TangentialOptions
+from wearsim.models.contact.strip_model import TangentialOptions
 from wearsim.plugins import ContactModelSpec, Options, registry
 from wearsim.scenario.tables.plugin import ContactChoice, ContactTable
 from wearsim.types import ContactSolution

@@ -10,8 +10,9 @@ import math
 import numpy as np
 
 from wearsim.errors import StepError
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import WearState, fresh_state
+from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.single_step import solve_at_record
 from wearsim.studies.run.recorder import history_row
 from wearsim.studies.run.result import Result

@@ -14,10 +14,11 @@ import numpy as np
 
 from wearsim.atomic_write import os_errors_converted, replacement
 from wearsim.errors import ContactError, ResultsFileError, SolverError
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.error_estimates import DEPTHS, greatest_depth, volume_of
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import Depths, WearState, fresh_state
+from wearsim.evolution.state import Depths, WearState
 from wearsim.evolution.steppers.implicit import ImplicitStepper
 from wearsim.evolution.steppers.per_pass import is_compiled
 from wearsim.evolution.strips import same_strips

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.error_estimates import (
     DEPTHS,
     greatest_depth,
@@ -14,7 +15,7 @@ from wearsim.evolution.error_estimates import (
 )
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import WearState, fresh_state
+from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.scenario import Scenario
 from wearsim.scenario.examples import shipped_scenario

@@ -8,9 +8,10 @@ from typing import Any, Literal
 import numpy as np
 
 from wearsim.errors import StepError
+from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.error_estimates import DEPTHS
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import WearState, fresh_state
+from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.single_step import (
     present_problem,
     recovery_at,
