@@ -269,6 +269,8 @@ class SolverError(WearsimError):
         "edge" (the contact reaches the edge of its strips), "too fine" (strips that are too narrow
         for the length of the contact), "skid" (friction cannot transmit the torque), "lost" (a load
         falls to zero) or empty.
+    places : sequence of int
+        Places in a batch of the tests that failed, if they are known.
 
     Examples
     --------
@@ -287,8 +289,10 @@ class SolverError(WearsimError):
         *,
         remedy: str = "",
         cause: str = "",
+        places: Sequence[int] = (),
     ) -> None:
         self.state, self.remedy, self.cause = state or {}, remedy, cause
+        self.places = (*places,)
         super().__init__(message, python=remedy, shell=remedy)
 
 

@@ -224,6 +224,25 @@ def test_bisection_isolates_failures():
     assert len(done) == 4
 
 
+@pytest.mark.parametrize("named", [[2, 5], [2], [], [9]])
+def test_failures_that_are_named_are_processed_apart(named):
+    parts = []
+
+    def work(places):
+        parts.append(places.tolist())
+        failing = {2, 5} & set(places.tolist())
+        if failing:
+            known = [k for k, place in enumerate(places.tolist()) if place in named] or named
+            raise StepError("fails", places=known)
+        return places
+
+    done, failed = bisect_failures(work, np.arange(8))
+    assert failed.keys() == {2, 5}
+    assert sorted(np.concatenate([places for places, _ in done]).tolist()) == [0, 1, 3, 4, 6, 7]
+    if named == [2, 5]:
+        assert parts == [[*range(8)], [0, 1, 3, 4, 6, 7], [2, 5], [2], [5]]
+
+
 def test_joined_problem_can_be_split():
     problems, _, _ = problems_of(CASES["three rollers"])
     joined = joined_problem(problems)

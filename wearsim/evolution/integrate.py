@@ -32,7 +32,10 @@ MOST_WIDENED = 12  # times that strips grow for one step
 def bisect_failures(
     work: Callable[[IntArray], T], places: IntArray
 ) -> tuple[list[tuple[IntArray, T]], dict[int, Exception]]:
-    """Process a batch, and its halves recursively where that raises.
+    """Process a batch, and parts of it recursively where that raises.
+
+    The parts are the places that have failed, if the exception names them, and the others; or else
+    both halves of the batch.
 
     Parameters
     ----------
@@ -44,7 +47,7 @@ def bisect_failures(
     Returns
     -------
     done : list of tuple
-        Places and result of each part, in their order.
+        Places and result of each part.
     failed : dict of int to Exception
         Exception of each place that fails when processed individually.
     """
@@ -55,9 +58,13 @@ def bisect_failures(
     except Exception as error:  # any exception ends the test that raised it and no other
         if len(places) == 1:
             return [], {int(places[0]): error}
-    middle = len(places) // 2
-    first, failed_first = bisect_failures(work, places[:middle])
-    second, failed_second = bisect_failures(work, places[middle:])
+        named = [place for place in getattr(error, "places", ()) if place < len(places)]
+    apart = np.zeros(len(places), dtype=bool)
+    apart[named] = True
+    if apart.all() or not apart.any():
+        apart = np.arange(len(places)) >= len(places) // 2
+    first, failed_first = bisect_failures(work, places[~apart])
+    second, failed_second = bisect_failures(work, places[apart])
     return first + second, failed_first | failed_second
 
 

@@ -9,6 +9,7 @@ from wearsim.mechanics.slender.half_length import (
     HIGHEST_FACTOR,
     LOWEST_FACTOR,
     REACH,
+    SWEEPS,
     HalfLengths,
     add_around,
     add_length_slopes,
@@ -93,8 +94,8 @@ def test_factors_and_their_slopes_are_those_of_two_sweeps(span: slice, k: int) -
     line_load, lengths = loads_of(span), new_lengths()
     # a wider and a narrower contact before it leave nothing
     for other in ("the whole track", "narrower than the reach", "first strips"):
-        find_factors(k, loads_of(SPANS[other]), True, lengths)
-    widest = find_factors(k, line_load, True, lengths)
+        find_factors(k, loads_of(SPANS[other]), True, SWEEPS, lengths)
+    widest = find_factors(k, line_load, True, SWEEPS, lengths)
     loaded = line_load[k] > 0.0
     s, log_ratio, derivative = factors(line_load[k], k)
     np.testing.assert_allclose(lengths.factor[k], s, rtol=1e-12)
@@ -137,20 +138,20 @@ def test_factors_and_their_slopes_are_those_of_two_sweeps(span: slice, k: int) -
 
 def test_factors_are_the_same_without_slopes() -> None:
     line_load, lengths = loads_of(SPANS["one patch"]), new_lengths()
-    widest, factor = find_factors(1, line_load, True, lengths), lengths.factor[1].copy()
+    widest, factor = find_factors(1, line_load, True, SWEEPS, lengths), lengths.factor[1].copy()
     lengths.slope[:] = 7.0
-    assert find_factors(1, line_load, False, lengths) == widest
+    assert find_factors(1, line_load, False, SWEEPS, lengths) == widest
     np.testing.assert_array_equal(lengths.factor[1], factor)
     assert (lengths.slope == 7.0).all()
 
 
 def test_strips_that_are_too_narrow_have_no_factors() -> None:
     line_load, lengths = loads_of(SPANS["one patch"]), new_lengths(SPACING / 1000.0)
-    widest = find_factors(0, line_load, True, lengths)
+    widest = find_factors(0, line_load, True, SWEEPS, lengths)
     assert widest == pytest.approx(lengths.log_scale[0] + 0.5 * np.log(line_load[0].max()))
     assert widest > HIGHEST
     assert (lengths.factor[0] == 1.0).all()
-    none = find_factors(1, np.zeros((2, STRIPS)), True, lengths)
+    none = find_factors(1, np.zeros((2, STRIPS)), True, SWEEPS, lengths)
     assert none == -np.inf
 
 
@@ -158,7 +159,7 @@ def test_local_half_lengths_have_no_factors() -> None:
     line_load, lengths = loads_of(SPANS["one patch"]), new_half_lengths(no_table(STRIPS), 2)
     fill_log_scales(MODULUS, CURVATURE, SPACING, lengths.log_scale)
     for k in range(2):
-        find_factors(k, line_load, True, lengths)
+        find_factors(k, line_load, True, SWEEPS, lengths)
     half_length = np.full((2, STRIPS), np.nan)
     fill_half_lengths(SPACING, line_load, lengths, half_length)
     expected = np.sqrt(4.0 * line_load / (np.pi * MODULUS * CURVATURE[:, None]))

@@ -9,7 +9,12 @@ import pytest
 from scipy.optimize import brentq
 
 from wearsim.mechanics.slender.body_wear import new_depth_system
-from wearsim.mechanics.slender.half_length import fill_log_scales, find_factors, new_half_lengths
+from wearsim.mechanics.slender.half_length import (
+    SWEEPS,
+    fill_log_scales,
+    find_factors,
+    new_half_lengths,
+)
 from wearsim.mechanics.slender.influence import curvature_table, influence_table, read_value
 from wearsim.mechanics.slender.newton import (
     AT_BEST,
@@ -83,7 +88,7 @@ class Contacts:
         state, size = new_newton_state(2, STRIPS), int(self.state.size[k])
         number_strips(k, self.line_load, MARGIN, state)
         state.surface[:] = 0.0
-        find_factors(k, self.line_load, True, self.lengths)
+        find_factors(k, self.line_load, True, SWEEPS, self.lengths)
         arguments = self.state.softness, self.line_load, self.lengths, state
         fill_jacobian(k, TABLE, UNIT, *arguments)
         found: np.ndarray = state.matrix[k, :size, :size].T
@@ -96,21 +101,22 @@ class Contacts:
             total = self.worn[:, 1] * line_load + (self.worn[:, 0] * line_load).sum(axis=0)
         return total
 
-    def displacement(self, line_load: np.ndarray) -> np.ndarray:
+    def displacement(self, line_load: np.ndarray, sweeps: int = SWEEPS) -> np.ndarray:
         """Return the displacement of all strips, with the half-lengths of the loads [m]."""
         total = np.zeros((2, STRIPS))
         for k in range(2):
-            find_factors(k, line_load, False, self.lengths)
+            find_factors(k, line_load, False, sweeps, self.lengths)
             for j in np.flatnonzero(line_load[k]):
                 tau = self.lengths.log_ratio[k, j]
                 value = [read_value(TABLE, tau, abs(i - int(j))) for i in range(STRIPS)]
                 total[k] += UNIT * line_load[k, j] * np.array(value)
         return total
 
-    def surface(self, line_load: np.ndarray) -> np.ndarray:
+    def surface(self, line_load: np.ndarray, sweeps: int = SWEEPS) -> np.ndarray:
         """Return gaps above their least one, with wear and displacement [m]."""
         above = self.gap - self.gap.min(axis=1, keepdims=True) + self.compliance * line_load
-        found: np.ndarray = above + self.wear(line_load) + self.displacement(line_load)
+        found: np.ndarray = above + self.wear(line_load)
+        found += self.displacement(line_load, sweeps)
         return found
 
 
@@ -178,7 +184,7 @@ def test_springs_under_the_displacement_correct_the_loads(shared: bool) -> None:
     these.start()
     start = these.line_load.copy()
     soft = FOUNDATION * UNIT + these.state.softness
-    surface = these.surface(start) - soft * start
+    surface = these.surface(start, sweeps=1) - soft * start
     these.rest(True)
     for k in range(2):
         part = slice(these.state.left[k], these.state.right[k])
@@ -277,7 +283,7 @@ class Check:
         self.state, self.line_load = self.these.state, self.these.line_load
         for k in range(2):
             number_strips(k, self.line_load, MARGIN, self.state)
-            find_factors(k, self.line_load, False, self.these.lengths)
+            find_factors(k, self.line_load, False, SWEEPS, self.these.lengths)
         self.state.surface[:], self.approach = 2e-6, np.array([1e-6, 1.5e-6])
         self.state.fresh[:] = False
 

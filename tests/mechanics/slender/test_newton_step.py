@@ -9,6 +9,7 @@ from scipy.optimize import brentq
 from wearsim.mechanics.slender.body_wear import add_depths
 from wearsim.mechanics.slender.half_length import (
     REACH,
+    SWEEPS,
     add_length_slopes,
     fill_log_scales,
     find_factors,
@@ -64,7 +65,7 @@ class Contact:
         """Return the displacement of all strips under line loads, with their half-lengths [m]."""
         state = self.state
         number_strips(0, line_load, STRIPS, state)
-        find_factors(0, line_load, False, self.lengths)
+        find_factors(0, line_load, False, SWEEPS, self.lengths)
         state.surface[0] = 0.0
         add_displacement(0, 0, STRIPS - 1, self.table, UNIT, line_load, self.lengths, state)
         return state.surface[0].copy()
@@ -85,7 +86,7 @@ def test_jacobian_is_the_slope_of_the_displacements(lengths: str) -> None:
         slopes[:, column] = (ends[0] - ends[1]) / (2e-5 * line_load[0, j])
     expected = contact.displacement(line_load)
     state = contact.state
-    find_factors(0, line_load, True, contact.lengths)
+    find_factors(0, line_load, True, SWEEPS, contact.lengths)
     state.surface[0] = 0.0
     fill_jacobian(0, contact.table, UNIT, own, line_load, contact.lengths, state)
     np.testing.assert_allclose(state.surface[0], expected, rtol=1e-12)
@@ -108,7 +109,7 @@ def test_jacobian_has_the_tangents_of_the_table(lengths: str, inside: list[int])
     line_load[0, inside] = 3e4 * (1.0 + np.random.default_rng(4).random(len(inside)))
     state, places, size = contact.state, np.arange(STRIPS), len(inside)
     number_strips(0, line_load, 2, state)
-    find_factors(0, line_load, True, contact.lengths)
+    find_factors(0, line_load, True, SWEEPS, contact.lengths)
     state.surface[0] = 1e-6
     fill_jacobian(0, contact.table, UNIT, own, line_load, contact.lengths, state)
     followed = slice(state.left[0], state.right[0])
@@ -173,7 +174,7 @@ def test_surface_beside_the_contact_follows_the_loads(gap_in_contact: bool) -> N
         line_load[0, 7] = 0.0
     state = contact.state
     number_strips(0, line_load, 1, state)
-    find_factors(0, line_load, False, contact.lengths)
+    find_factors(0, line_load, False, SWEEPS, contact.lengths)
     state.change[0] = np.where(line_load[0] > 0.0, 1e2 * np.arange(STRIPS), 0.0)
     state.surface[0] = 0.0
     predict_surface(0, contact.table, UNIT, contact.lengths.log_ratio, state)
@@ -262,7 +263,7 @@ def test_strips_that_may_be_penetrated_get_their_whole_surface(reach: tuple[int,
     contact, line_load, state = Contact("local"), np.zeros((1, STRIPS)), new_newton_state(1, STRIPS)
     line_load[0, [6, 8]] = 3e4, 2e4
     number_strips(0, line_load, 1, state)
-    find_factors(0, line_load, False, contact.lengths)
+    find_factors(0, line_load, False, SWEEPS, contact.lengths)
     assert (state.left[0], state.right[0]) == (5, 10)
     places = np.arange(STRIPS)
     gap = np.where((places >= reach[0]) & (places < reach[1]), 1e-7 * places, 1e-3)
@@ -281,7 +282,7 @@ def test_strips_that_may_be_penetrated_get_their_whole_surface(reach: tuple[int,
 def test_residual_is_corrected_by_the_own_load_of_each_strip() -> None:
     contact, line_load, state = Contact("local"), loaded(), new_newton_state(1, STRIPS)
     number_strips(0, line_load, 1, state)
-    find_factors(0, line_load, False, contact.lengths)
+    find_factors(0, line_load, False, SWEEPS, contact.lengths)
     size, inside = int(state.size[0]), np.flatnonzero(line_load[0])
     state.step[0, :size] = line_load[0, inside] * np.linspace(-0.2, 0.3, size)
     state.step[0, 2] = 5.0 * line_load[0, inside[2]]  # far too great to be corrected

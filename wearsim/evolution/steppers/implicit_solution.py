@@ -196,6 +196,7 @@ def step_by_formula(
                 f"an implicit step of {passes[0]:.4g} passes from pass {state.passes[0]:.0f} did"
                 f" not converge (last relative change {(change / depth).max():.1e})",
                 state.to_arrays(),
+                places=active.nonzero()[0].tolist(),
             )
         loads.used = loads.target
         if iteration < DAMPED_FROM:

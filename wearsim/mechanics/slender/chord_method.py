@@ -26,6 +26,7 @@ from wearsim.mechanics.numerics.jit import subroutine
 from wearsim.mechanics.numerics.lu import invert_in_place, whole_panels
 from wearsim.mechanics.slender.half_length import (
     REACH,
+    SWEEPS,
     HalfLengths,
     add_around,
     add_length_slopes,
@@ -168,7 +169,7 @@ def set_anchor(
     bool
         False if the Jacobian is singular.
     """
-    find_factors(g, line_load, True, state.lengths)
+    find_factors(g, line_load, True, SWEEPS, state.lengths)
     n = line_load.shape[1]
     reach, small, unit = min(BAND, n), 1e-3, constants.unit
     guards, count = _number_strips(g, line_load, state), state.loaded[g]
@@ -381,7 +382,7 @@ def solve_fully(
         loads.line_load[g, i] = line_load[0, 0, i]
     if not anchored:
         _number_strips(g, loads.line_load, state)
-        find_factors(g, loads.line_load, False, state.lengths)
+        find_factors(g, loads.line_load, False, SWEEPS, state.lengths)
         return CONVERGED
     for i in range(n):
         loads.anchor[g, i], loads.anchor_gap[g, i] = line_load[0, 0, i], state.gap[i]

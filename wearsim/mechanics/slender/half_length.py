@@ -288,7 +288,9 @@ def _find_span(k: int, line_load: FloatArray) -> tuple[int, int]:
 
 
 @subroutine
-def find_factors(k: int, line_load: FloatArray, sloped: bool, lengths: HalfLengths) -> float:
+def find_factors(
+    k: int, line_load: FloatArray, sloped: bool, sweeps: int, lengths: HalfLengths
+) -> float:
     """Fill s and ln(a/dy) of contact `k`, and the slope of s if `sloped`.
 
     Parameters
@@ -299,6 +301,8 @@ def find_factors(k: int, line_load: FloatArray, sloped: bool, lengths: HalfLengt
         q [N/m]; strips without load are ignored.
     sloped : bool
         Whether the slope is computed.
+    sweeps : int
+        Evaluations of s: `SWEEPS`, or fewer where an estimate is sufficient.
     lengths : HalfLengths
         Filled.
 
@@ -318,7 +322,7 @@ def find_factors(k: int, line_load: FloatArray, sloped: bool, lengths: HalfLengt
             widest = max(widest, log_ratio[k, j])
     if lengths.table.shape[0] == 0:
         return widest
-    for sweep in range(SWEEPS):
+    for sweep in range(sweeps):
         if widest > HIGHEST:
             break
         for j in range(first, last + 1):

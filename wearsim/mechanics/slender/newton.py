@@ -40,6 +40,7 @@ from wearsim.mechanics.slender.body_wear import (
     solve_depths,
 )
 from wearsim.mechanics.slender.half_length import (
+    SWEEPS,
     HalfLengths,
     fill_half_lengths,
     fill_log_scales,
@@ -250,7 +251,8 @@ def rest_contacts(
     """Fill line loads and approaches of contacts on a foundation.
 
     Those with line loads keep them, unless the foundation lies under the displacement by these
-    loads, `displaced`; the other parameters are as of `start_strips`.
+    loads, `displaced`, for which one evaluation of s is sufficient. The other parameters are as of
+    `start_strips`.
     """
     surface, softness, unit = state.surface, state.softness, these.unit
     soft, widest = (FOUNDATION if displaced else FIRST_FOUNDATION) * unit, -np.inf
@@ -261,7 +263,7 @@ def rest_contacts(
                 own = these.compliance[k, i]
                 surface[k, i] -= (soft + softness[k, i] - own) * line_load[k, i]
         if displaced:
-            widest = max(widest, find_factors(k, line_load, False, lengths))
+            widest = max(widest, find_factors(k, line_load, False, 1, lengths))
     if members is not None and displaced:
         add_depths(members, worn, line_load, surface)
     for k in range(line_load.shape[0] if widest <= HIGHEST else 0):
@@ -310,7 +312,7 @@ def factor_contacts(
             number_depths(members, these.compliance, worn, state, system, state.softness)
     for k in range(line_load.shape[0]):
         fresh = state.fresh[k]
-        if find_factors(k, line_load, fresh, lengths) > HIGHEST:
+        if find_factors(k, line_load, fresh, SWEEPS, lengths) > HIGHEST:
             return TOO_FINE, renewed
         if not fresh:
             first, last = state.left[k], state.right[k] - 1

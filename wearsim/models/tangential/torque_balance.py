@@ -14,6 +14,9 @@ from wearsim.mechanics.numerics.roots import bracketed_roots, secant_roots
 from wearsim.types import FloatArray, Grid
 
 _SLIDING = 100.0  # creepage of gross sliding, over that of full slip
+# last step of the secant method over the creepage of full slip, after which the torques balance to
+# 1e-9 of those in full slip
+_LAST_STEP = 1e-7
 
 
 def balanced_creepage(
@@ -58,7 +61,7 @@ def balanced_creepage(
     def excess(creepage: FloatArray) -> FloatArray:
         return np.where(rolls, torque_of(creepage) - needed, creepage - given)
 
-    creepage, converged = secant_roots(excess, first, full_slip)
+    creepage, converged = secant_roots(excess, first, full_slip, _LAST_STEP)
     if converged.all():
         return creepage
     reach = _SLIDING * full_slip + added_creepage + np.abs(given)
