@@ -223,7 +223,7 @@ def process(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> SimpleNamespace:
 
     monkeypatch.setattr(jit, "subprocess", SimpleNamespace(DEVNULL=None, Popen=started))
     monkeypatch.setattr(jit.os, "sched_getaffinity", lambda _: {0, 1}, raising=False)
-    monkeypatch.setattr(jit, "_SEARCH", 0.0)
+    monkeypatch.setattr(jit, "SEARCH", 0.0)
     monkeypatch.setattr(jit.Kernel, "may_be_interpreted", True)
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     return one

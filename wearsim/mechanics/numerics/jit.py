@@ -38,7 +38,7 @@ _ALONGSIDE: dict[str, list[Alongside]] = {}  # by the name of a kernel
 # kernels of another process; each is interpreted until the cache holds the kernel of the value
 _INTERPRETED: dict[str, str] = {}
 _SEARCHED: dict[str, float] = {}  # when the cache was last searched for those kernels
-_SEARCH = 0.1  # seconds between two searches of the cache
+SEARCH = 0.1  # seconds between two searches of the cache
 _STARTED: list[Any] = []  # processes that compile kernels
 _LOCK = threading.RLock()
 
@@ -84,18 +84,16 @@ class Kernel:
 
     def _is_interpreted(self, arguments: Sequence[Any]) -> bool:
         """Return whether another process compiles the function, which is started if need be."""
-        if not Kernel.may_be_interpreted:
-            return False
-        name, is_short = self.__name__, self.is_short
+        name, is_short = self.__name__, self.is_short if Kernel.may_be_interpreted else None
         if is_short and name in _ALONGSIDE and is_short(False, *arguments) and not_cached({name}):
-            with _LOCK:
-                _call_elsewhere(name, interpreted=True)
-        if name not in _INTERPRETED or (is_short and not is_short(True, *arguments)):
+            _call_elsewhere(name, interpreted=True)
+        if not Kernel.may_be_interpreted or name not in _INTERPRETED:
             return False
-        if name not in _SEARCHED:
-            for report in _REPORTS:
-                report(name)
-        if time.monotonic() > _SEARCHED.get(name, 0.0) + _SEARCH:
+        if is_short and not is_short(True, *arguments):
+            return False
+        for report in _REPORTS if name not in _SEARCHED else ():
+            report(name)
+        if time.monotonic() > _SEARCHED.get(name, 0.0) + SEARCH:
             if _STARTED[-1].poll() is not None or not not_cached({_INTERPRETED[name]}):
                 del _INTERPRETED[name]
                 return False
@@ -311,10 +309,7 @@ def only_compiled() -> Iterator[None]:
 
 @contextmanager
 def compilation_reported(report: Callable[[str], None]) -> Iterator[None]:
-    """Call `report` with the name of every kernel that is compiled in the context, at its start.
-
-    A kernel that is read from the cache is not compiled.
-    """
+    """Call `report` with the name of every kernel that is compiled in the context, at its start."""
     _REPORTS.append(report)
     try:
         yield
@@ -406,7 +401,7 @@ def call_functions(names: Sequence[tuple[str, str]]) -> None:
                 lock_file(file.fileno())
                 break
             except OSError:
-                time.sleep(_SEARCH)
+                time.sleep(SEARCH)
         for function in functions:
             function()
 

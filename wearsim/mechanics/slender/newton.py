@@ -22,13 +22,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import (
-    borrowed,
-    compile_alongside,
-    kept,
-    kernel,
-    subroutine,
-)
+from wearsim.mechanics.numerics.jit import borrowed, kept, kernel, subroutine
 from wearsim.mechanics.numerics.lu import solve_factored
 from wearsim.mechanics.slender.body_wear import (
     add_depths,
@@ -84,8 +78,6 @@ MAX_ITERATIONS = 100
 CAUTIOUS = 12  # iterations after which the active set is changed cautiously
 MARGIN = 6  # strips followed on either side of the loaded ones
 FIRST_MARGIN = 20  # the same for a foundation, which may load many strips more than the start
-# strips of a test that Python solves while the kernel is compiled, and of its records together
-INTERPRETED, TOGETHER = 250, 5000
 
 
 class ContactSet(NamedTuple):
@@ -502,23 +494,3 @@ def solve_slender(
         kept(depths)
     kept(owned)
     return failed
-
-
-def compile_solve_slender() -> None:
-    """Compile `solve_slender` for independent contacts by a call for one contact of one strip."""
-    strip, contact, count = np.ones((1, 1, 1)), np.ones((1, 1)), np.ones(1, np.int64)
-    table = np.ones((2, 2, 1))
-    table.setflags(write=False)  # as that of `influence_table`
-    solve_slender(
-        *(strip, strip.copy(), None, None, contact, contact.copy(), 1.0, 1e11, table, table),
-        *(1.0, strip.copy(), contact.copy(), strip.copy(), strip.copy(), count, count.copy()),
-    )
-
-
-def _is_short(
-    started: bool, gap: FloatArray, _: FloatArray, bodies: IntArray | None, *__: object
-) -> bool:
-    return bodies is None and gap.size <= (TOGETHER if started else INTERPRETED)
-
-
-compile_alongside("solve_slender", compile_solve_slender, "solve_slender", is_short=_is_short)

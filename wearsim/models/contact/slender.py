@@ -11,7 +11,7 @@ from pydantic import Field
 
 from wearsim.contact_batch import NO_BODY, ContactBatch, ContactBatchSolution
 from wearsim.errors import ContactError
-from wearsim.mechanics.numerics.jit import kernel_input, kernel_inputs
+from wearsim.mechanics.numerics.jit import compile_alongside, kernel_input, kernel_inputs
 from wearsim.mechanics.slender import newton as kernels
 from wearsim.mechanics.slender.influence import HIGHEST, curvature_table, no_table
 from wearsim.mechanics.tangential.strip_interaction import strip_elasticity
@@ -38,6 +38,8 @@ from wearsim.plugins import (
 from wearsim.plugins.contact_model import naming_contact, solved_one_by_one
 from wearsim.types import FloatArray, Grid, IntArray, Material
 
+# strips of a test that Python solves while the kernel is compiled, and of its records together
+INTERPRETED, TOGETHER = 250, 5000
 #: Strip width [m], E* [Pa], two tables and tolerance of `mechanics.slender.newton.solve_slender`.
 Constants: TypeAlias = tuple[float, float, FloatArray, FloatArray, float]
 _FAILURE = {
@@ -439,3 +441,24 @@ SPEC = ContactModelSpec(
         "Carter, Proc. R. Soc. A 112 (1926), DOI 10.1098/rspa.1926.0100",
     ),
 )
+
+
+def compile_solve_slender() -> None:
+    """Compile `solve_slender` for independent contacts by a call for one contact of one strip."""
+    strip, contact, count = np.ones((1, 1, 1)), np.ones((1, 1)), np.ones(1, np.int64)
+    table = np.ones((2, 2, 1))
+    table.setflags(write=False)  # as that of `influence_table`
+    kernels.solve_slender(
+        *(strip, strip.copy(), None, None, contact, contact.copy(), 1.0, 1e11, table, table),
+        *(1.0, strip.copy(), contact.copy(), strip.copy(), strip.copy(), count, count.copy()),
+    )
+
+
+def is_short(
+    started: bool, gap: FloatArray, _: FloatArray, bodies: IntArray | None, *__: object
+) -> bool:
+    """Return whether Python solves contacts in less time than the kernel takes to be compiled."""
+    return bodies is None and gap.size <= (TOGETHER if started else INTERPRETED)
+
+
+compile_alongside("solve_slender", compile_solve_slender, "solve_slender", is_short=is_short)
