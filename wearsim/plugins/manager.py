@@ -269,7 +269,7 @@ def registry() -> Registry:
 def built_plugin(
     spec: Any, expected: type[Any], checked: Callable[[Any, str], Built], *arguments: Any
 ) -> Built:
-    """Return what the factory of a plugin builds, with checks of its values if it is third-party.
+    """Build the object of a plugin; the values of a third-party plugin are checked from then on.
 
     Parameters
     ----------

@@ -230,7 +230,7 @@ def process(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> SimpleNamespace:
 
 
 def _interpreted(function: Any, limit: float = 10.0) -> Any:
-    """Return a kernel whose calls with a first number below a limit may be interpreted."""
+    """Return a kernel; Python may interpret its calls if their first argument is below `limit`."""
     compiled = kernel(function)
     name = function.__name__
     compile_alongside(name, _compile_others, "other")

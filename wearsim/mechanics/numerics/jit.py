@@ -69,14 +69,14 @@ class Kernel:
         if self._dispatcher is not None:
             return self._dispatcher(*arguments)
         if self._is_interpreted(arguments):
-            saved = [a.copy() if isinstance(a, np.ndarray) else a for a in arguments]
+            arrays = [a for a in arguments if isinstance(a, np.ndarray) and a.flags.writeable]
+            saved = [array.copy() for array in arrays]
             try:
                 with np.errstate(all="ignore"):
                     return self._function(*arguments)
             except (ArithmeticError, ValueError):  # compiled functions return what is not finite
-                for changed, before in zip(arguments, saved, strict=True):
-                    if isinstance(changed, np.ndarray) and changed.flags.writeable:
-                        changed[...] = before
+                for array, before in zip(arrays, saved, strict=True):
+                    array[...] = before
         # of the objects of numba and of a compilation almost all remain; collecting garbage among
         # them takes a tenth of the time
         with _without_collection():
@@ -84,12 +84,12 @@ class Kernel:
 
     def _is_interpreted(self, arguments: Sequence[Any]) -> bool:
         """Return whether another process compiles the function, which is started if need be."""
-        name, is_short = self.__name__, self.is_short if Kernel.may_be_interpreted else None
+        if not Kernel.may_be_interpreted:
+            return False
+        name, is_short = self.__name__, self.is_short
         if is_short and name in _ALONGSIDE and is_short(False, *arguments) and not_cached({name}):
             _call_elsewhere(name, interpreted=True)
-        if not Kernel.may_be_interpreted or name not in _INTERPRETED:
-            return False
-        if is_short and not is_short(True, *arguments):
+        if name not in _INTERPRETED or (is_short and not is_short(True, *arguments)):
             return False
         for report in _REPORTS if name not in _SEARCHED else ():
             report(name)
@@ -362,11 +362,11 @@ def compile_alongside(
 
 
 def _call_elsewhere(name: str, *, interpreted: bool) -> None:
-    """Start a process that compiles what is registered alongside a kernel, if possible.
+    """Start a process that calls the functions registered for a kernel.
 
-    There must be a cache and a second processor. The process ends when the last function returns,
-    also after the end of this process. It compiles the kernel itself if Python interprets kernels
-    meanwhile.
+    Nothing is started without a cache or a second processor. The process ends when the last
+    function returns, also after the end of this process. It compiles the kernel itself, too, if
+    Python interprets kernels meanwhile.
     """
     registered = [a for a in _ALONGSIDE.pop(name, ()) if interpreted or name not in a.kernels]
     if not registered or processors() == 1 or _cache_folder() is None:
