@@ -32,6 +32,7 @@ from wearsim.mechanics.numerics.edge_strips import (
 
 TESTS, STRIPS, ROLLERS = 3, 12, 2
 CONTACTS, SIZE = ROLLERS * TESTS, 1e-6
+ALL = np.ones(TESTS, np.bool_)
 ROLLERS_OF_ONE = np.array([[0, 1], [0, 2]])
 STATIONS = np.array([[0, 2], [1, 2]])  # of a cam that one roller passes
 
@@ -148,8 +149,12 @@ def test_bodies_of_a_cam_have_no_greatest_part() -> None:
 
 def test_wear_by_others_is_divided_at_the_edge(edges: Edges) -> None:
     sums = np.full(edges.shape, np.nan)
-    sum_of_wear(edges.strips, edges.wear, sums)
-    np.testing.assert_allclose(sums, edges.sums(edges.wear), rtol=1e-14)
+    active = np.array([True, False, True])
+    sum_of_wear(edges.strips, active, edges.wear, sums)
+    np.testing.assert_allclose(sums[:, 0], edges.sums(edges.wear)[:, 0], rtol=1e-14)
+    assert np.isnan(sums[:, 1:]).all()  # finished, and without edges
+    sum_of_wear(edges.strips, ALL, edges.wear, sums)
+    np.testing.assert_allclose(sums[:, :2], edges.sums(edges.wear)[:, :2], rtol=1e-14)
     for k, _, i in edges.each():
         found = by_others(edges.strips, edges.wear, sums, k, i)
         ahead, grown, joint = edges.others(k, i)
@@ -161,7 +166,7 @@ def test_wear_by_others_is_divided_at_the_edge(edges: Edges) -> None:
 
 def test_linearised_wear_has_value_and_slope_of_the_mean_wear(edges: Edges) -> None:
     gaps, slopes = np.empty(edges.level.shape), np.empty(edges.level.shape)
-    linearise_edges(edges.strips, edges.level, edges.wear, gaps, slopes)
+    linearise_edges(edges.strips, ALL, edges.level, edges.wear, gaps, slopes)
     scaled = np.zeros_like(edges.wear)
     for k, _, i in edges.each():
         if np.isfinite(slopes[k, i]):
@@ -204,17 +209,19 @@ def test_difference_to_the_formula_is_the_greatest_of_all_strips(edges: Edges, p
     rng = np.random.default_rng(2)
     edges.loads *= part
     gaps, slopes = np.empty(edges.level.shape), np.empty(edges.level.shape)
-    linearise_edges(edges.strips, edges.level, edges.wear, gaps, slopes)
+    linearise_edges(edges.strips, ALL, edges.level, edges.wear, gaps, slopes)
     linear, apart = SIZE * rng.random((2, CONTACTS, STRIPS))
     level, active = edges.level.copy(), np.array([True, False, True])
     arguments = edges.strips, active, gaps, slopes, linear, apart, edges.loads, edges.wear, level
     rest, expected = compare_edges(*arguments), np.zeros((TESTS, STRIPS))
     for k, v, i in edges.each():
+        if not active[v]:
+            assert level[k, i] == edges.level[k, i]
+            continue
         moved = gaps[k, i] + linear[k, i] - apart[k, i] - edges.strips.gap[k, i]
-        moved = moved if active[v] else edges.level[k, i]
         _, grown, joint = edges.others(k, i)
         mean, expected_level = edges.mean_wear(k, i, moved), moved
-        if active[v] and edges.loads[k, i] > 0.0 and slopes[k, i] == np.inf:
+        if edges.loads[k, i] > 0.0 and slopes[k, i] == np.inf:
             halfway = edges.strips.first[k, i] + grown  # the edge in the middle of the strip
             assert edges.part_of(k, i, halfway) == pytest.approx(0.5) or edges.part[k, i] == 1.0
             expected_level = max(moved, halfway)

@@ -37,6 +37,7 @@ from wearsim.mechanics.numerics.multistep import ROWS, formulas, new_differences
 TESTS, STRIPS, SIZE = 3, 5, 1e-6
 ROLLERS, STATIONS = np.array([[0, 1], [0, 2]]), np.array([[0, 2], [1, 2]])
 SHAPE, CONTACTS = (3, TESTS, STRIPS), len(ROLLERS) * TESTS
+ALL = np.ones(TESTS, np.bool_)
 
 
 class Step:
@@ -156,17 +157,18 @@ def test_step_begins_with_its_formula(step: Step) -> None:
 def linearised(step: Step) -> None:
     """Begin a step, and linearise its wear."""
     step.begin()
-    linearise_step(*step.strips, step.loads, step.wear, step.exponents, step.about, step.compliance)
+    of_wear = step.loads, step.wear, step.exponents
+    linearise_step(*step.strips, *of_wear, ALL, step.about, step.compliance)
 
 
 def test_wear_is_linearised_about_the_depth_of_each_strip(step: Step) -> None:
     linearised(step)
     gaps, slopes = np.empty((2, CONTACTS, STRIPS))
-    linearise_edges(step.copied(), step.of_contacts[2], step.wear, gaps, slopes)
+    linearise_edges(step.copied(), ALL, step.of_contacts[2], step.wear, gaps, slopes)
     np.testing.assert_array_equal(step.about[:2], [gaps, slopes])
     compliance, opened = np.empty_like(step.compliance), np.empty_like(gaps)
     constant, of_wear = np.empty_like(step.wear), (step.loads, step.wear, step.exponents)
-    linearised_wear(*of_wear, slopes, step.bodies, gaps, compliance, opened, constant)
+    linearised_wear(*of_wear, slopes, step.bodies, gaps, ALL, compliance, opened, constant)
     np.testing.assert_array_equal(step.compliance, compliance)
     np.testing.assert_array_equal(step.about[2:], [opened, *constant])
 
@@ -175,10 +177,10 @@ def test_solution_is_compared_with_the_linearised_wear_and_the_edges(step: Step)
     linearised(step)
     rng, active = np.random.default_rng(7), np.array([True, False, True])
     loads, apart = step.loads * (0.8 + 0.4 * rng.random((CONTACTS, STRIPS))), SIZE * rng.random()
-    wear, worn = SIZE * rng.random(step.wear.shape) * (loads > 0.0), np.full(SHAPE, np.nan)
-    apart = np.full((CONTACTS, STRIPS), apart)
+    wear, worn = SIZE * rng.random(step.wear.shape) * (loads > 0.0), np.full(SHAPE, 7.0)
+    apart = np.full((CONTACTS, STRIPS), -200.0 * apart)  # far from the formula
     passes = step.by_contact(step.of_bodies[0] * step.of_tests[0][:, None])
-    by_formula, exponents, known = wear * passes, step.exponents.copy(), np.empty(SHAPE)
+    by_formula, exponents, known = wear * passes, step.exponents.copy(), worn.copy()
     linear, strips, level = np.empty_like(loads), step.copied(), step.of_contacts[2].copy()
     of_bodies = wear_of_bodies(
         *(loads, step.loads, by_formula, step.wear, step.compliance, step.about[3:], step.bodies),

@@ -102,7 +102,9 @@ def test_incompatible_realisations_are_in_separate_groups():
 
 def test_group_size_is_limited_by_number_of_strips(monkeypatch):
     monkeypatch.setattr("wearsim.studies.ensemble.batch.MAX_STRIPS", 2 * 71)
-    assert [len(group) for group in batch_groups(runs_of(5, **ONE))] == [2, 2, 1]
+    groups = batch_groups(runs_of(5, **ONE))
+    assert [len(group) for group in groups] == [1, 2, 2]
+    assert [run.number for group in groups for run in group] == list(range(5))
 
 
 def test_failed_realisation_does_not_change_others():

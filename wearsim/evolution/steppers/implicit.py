@@ -44,7 +44,7 @@ from wearsim.mechanics.numerics.step_errors import (
     assess_step,
     parts_of_aim,
 )
-from wearsim.types import FloatArray, IntArray
+from wearsim.types import BoolArray, FloatArray, IntArray
 
 # the first step, by a power of the tolerance, in units of that of other steppers; it adds a third
 # of the allowed error at tolerances from 1e-2 to 1e-5, on the rig and on cams
@@ -324,16 +324,21 @@ def implicit_step(
     assert order is not None
     if problem.constant_load is None:  # wear per load and pass is not smooth where the load jumps
         order = np.where(abrupt_loads(problem, state.passes, passes), 1, order)
+    step = here, state, passes, conditions
     try:
-        end, decreased = step_by_formula(here, state, passes, conditions, order, near)
+        end, decreased, unsolved = step_by_formula(*step, order, near)
     except (StepError, ContactError) as error:
         # the past points may lead beyond the depth at which a spring is unloaded, or to a profile
-        # on which the contact is not found; strips that are not cut are the simpler problem
-        whole = state.separation is None or bool(edges.unresolved(state).all())
-        if len(order) > 1 or (order[0] == 1 and whole) or getattr(error, "cause", "") == "edge":
+        # on which the contact is not found
+        is_edge = getattr(error, "cause", "") == "edge"
+        if len(order) > 1 or is_edge or not _has_simpler_step(state, order)[0]:
             raise
-        start = state if whole else edges.without_edges(here, state)
-        return step_by_formula(here, start, passes, conditions, np.ones_like(order))[0]
+        return _step_of_first_order(*step, np.zeros(1, dtype=np.int64))
+    if (failed := unsolved.nonzero()[0]).size:
+        final = np.where(_has_simpler_step(state, order), 0.0, unsolved)
+        _check_convergence(state, passes, failed, final[failed])
+        end = end.with_others(failed, _step_of_first_order(*step, failed))
+        decreased[failed] = False
     several_rollers = problem.shape[1] > 1 and problem.shape[0] == 1
     if several_rollers and end.separation is not None and edges.beyond_edges(state, end).any():
         raise StepError(
@@ -344,8 +349,56 @@ def implicit_step(
     for lower in (2, 1) if decreased.nonzero()[0].size else ():
         again: IntArray = (decreased & (np.asarray(end.order) > lower)).nonzero()[0]
         if again.size:
-            columns = (column[..., again] for column in vars(conditions).values())
-            some = here.at(again), state.at(again), passes[again], Conditions(*columns)
-            part, decreased[again] = step_by_formula(*some, np.full_like(again, lower))
+            some, orders = _step_of(*step, again), np.full_like(again, lower)
+            part, decreased[again], unsolved = step_by_formula(*some, orders)
+            _check_convergence(state, passes, again, unsolved)
             end = end.with_others(again, part)
     return end
+
+
+def _step_of(
+    problem: WearProblem,
+    state: WearState,
+    passes: FloatArray,
+    conditions: Conditions,
+    places: IntArray,
+) -> tuple[WearProblem, WearState, FloatArray, Conditions]:
+    """Return the arguments of `step_by_formula` for some tests of a batch."""
+    columns = (column[..., places] for column in vars(conditions).values())
+    return problem.at(places), state.at(places), passes[places], Conditions(*columns)
+
+
+def _has_simpler_step(state: WearState, order: IntArray) -> BoolArray:
+    """Return for which tests a step of first order in which no strips are cut is another one."""
+    resolved = state.separation is not None and ~edges.unresolved(state)
+    return np.asarray((order > 1) | resolved)
+
+
+def _step_of_first_order(
+    problem: WearProblem,
+    state: WearState,
+    passes: FloatArray,
+    conditions: Conditions,
+    places: IntArray,
+) -> WearState:
+    """Return some tests of a batch after steps of first order in which no strips are cut."""
+    here, start, lengths, own = _step_of(problem, state, passes, conditions, places)
+    if start.separation is not None:
+        start = edges.without_edges(here, start)
+    end, _, unsolved = step_by_formula(here, start, lengths, own, np.ones_like(places))
+    _check_convergence(state, passes, places, unsolved)
+    return end
+
+
+def _check_convergence(
+    state: WearState, passes: FloatArray, places: IntArray, unsolved: FloatArray
+) -> None:
+    """Raise StepError if the iteration of some tests of a batch, by place, did not converge."""
+    if (failed := places[unsolved > 0.0]).size:
+        first = failed[0]
+        raise StepError(
+            f"an implicit step of {passes[first]:.4g} passes from pass {state.passes[first]:.0f}"
+            f" did not converge (last relative change {unsolved.max():.1e})",
+            state.to_arrays(),
+            places=failed.tolist(),
+        )

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from wearsim.contact_batch import ContactBatch, ContactBatchSolution
-from wearsim.errors import StepError
 from wearsim.evolution.contacts import contact_batch
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import Past, WearState, separated
@@ -66,8 +65,8 @@ def step_by_formula(
     conditions: Conditions,
     order: IntArray,
     near: ContactBatchSolution | None = None,
-) -> tuple[WearState, BoolArray]:
-    """Return the state after an implicit step, and whether depths or energy decrease.
+) -> tuple[WearState, BoolArray, FloatArray]:
+    """Solve the equations of an implicit step.
 
     The equations are: depths = ``base + wear of worn_passes at the end``. The wear enters the
     contact problem as a compliance: it is linearised in the line load about an earlier solution.
@@ -87,10 +86,14 @@ def step_by_formula(
     near : ContactBatchSolution, optional
         Solutions from which the contact model starts, by default those at the start of the step.
 
-    Raises
-    ------
-    StepError
-        If the iteration does not converge.
+    Returns
+    -------
+    end : WearState
+        State after the step.
+    decreased : ndarray of bool, shape (realisations,)
+        Whether depths or energy decrease.
+    unsolved : ndarray, shape (realisations,)
+        Last relative change of the wear where the iteration did not converge, 0 where it did.
     """
     past, contacts, depths = state.past, state.contacts, state.stacked
     bodies, gap = problem.body_rows, problem.contact_gap
@@ -98,7 +101,7 @@ def step_by_formula(
     realisations, strips = passes.size, shape[1]
     # tests that resolve edges, whose depths or energy decrease, in a groove, and in progress
     resolved, decreased, in_groove, active = np.zeros((4, realisations), dtype=np.bool_)
-    active[:] = True
+    active[:], unsolved = True, np.zeros(realisations)
     if past.part.size and not past.separation.size:  # strips in contact as wholes are counted
         in_groove[:] = have_groove(problem, state)
     # line loads and wear about which the wear is linearised
@@ -147,7 +150,7 @@ def step_by_formula(
     stations, iterations = problem.shape[0], np.zeros(realisations, dtype=np.int64)
     most = MAX_LINEAR_EXPONENT if problem.linear_wear else MAX_EXPONENT
     for iteration in range(1, MAX_FIXED_POINT + 1):
-        linearise_step(*of_step, line_load, wear, exponents, about, compliance)
+        linearise_step(*of_step, line_load, wear, exponents, active, about, compliance)
         batch = contact_batch(problem, about[2], loads.used, *separated(guess, stations))
         warm = contacts if near is None or iteration > 1 else near
         solved = solve_compliant(problem, batch, compliance, warm, active)
@@ -186,18 +189,14 @@ def step_by_formula(
             most_change = np.minimum(most_change, of_partial_slip)
         active &= ~(change <= converged * most_change)
         contacts = solved
+        if iteration in {RELAXATION_INTERVAL, MAX_FIXED_POINT}:
+            # with a relaxed tolerance a step without wear might pass where strips are cut
+            stopped = active if iteration == MAX_FIXED_POINT else active & resolved
+            last = np.nan_to_num(change / depth, nan=np.inf, posinf=np.inf)
+            unsolved = np.where(stopped, last, unsolved)
+            active &= ~stopped
         if not active.nonzero()[0].size:
             break
-        # with a relaxed tolerance a step without wear might pass where strips are cut
-        if iteration == MAX_FIXED_POINT or (
-            iteration == RELAXATION_INTERVAL and (active & resolved).any()
-        ):
-            raise StepError(
-                f"an implicit step of {passes[0]:.4g} passes from pass {state.passes[0]:.0f} did"
-                f" not converge (last relative change {(change / depth).max():.1e})",
-                state.to_arrays(),
-                places=active.nonzero()[0].tolist(),
-            )
         loads.used = loads.target
         if iteration < DAMPED_FROM:
             line_load, wear = solved.line_load, new
@@ -254,7 +253,7 @@ def step_by_formula(
         order=order,
         **others,
     )
-    return end, decreased
+    return end, decreased, unsolved
 
 
 class LoadsOfStep:

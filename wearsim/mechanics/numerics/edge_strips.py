@@ -132,15 +132,18 @@ def part_at(strips: EdgeStrips, k: int, i: int, level: float, grown: float) -> f
 
 
 @subroutine
-def sum_of_wear(strips: EdgeStrips, wear: FloatArray, sums: FloatArray) -> None:
-    """Fill the wear of each body by all contacts."""
-    _, realisations, n = sums.shape
-    sums[:] = 0.0
+def sum_of_wear(strips: EdgeStrips, active: BoolArray, wear: FloatArray, sums: FloatArray) -> None:
+    """Fill the wear of each body by all contacts, in active tests that resolve edges."""
+    rows, realisations, n = sums.shape
+    for v in range(realisations):
+        for b in range(rows if active[v] and strips.resolved[v] else 0):
+            sums[b, v, :] = 0.0
     for k in range(wear.shape[1]):
-        for side in range(2):
+        v = k % realisations
+        for side in range(2 if active[v] and strips.resolved[v] else 0):
             b = strips.bodies[k // realisations, side]
             for i in range(n):
-                sums[b, k % realisations, i] += wear[side, k, i]
+                sums[b, v, i] += wear[side, k, i]
 
 
 @subroutine
@@ -180,6 +183,7 @@ def by_others(
 @subroutine
 def linearise_edges(
     strips: EdgeStrips,
+    active: BoolArray,
     level: FloatArray,
     wear: FloatArray,
     gaps: FloatArray,
@@ -190,6 +194,8 @@ def linearise_edges(
     Parameters
     ----------
     strips : EdgeStrips
+    active : ndarray of bool, shape (realisations,)
+        Realisations whose results are computed.
     level : ndarray, shape (contacts, strips)
         Depth l [m].
     wear : ndarray, shape (2, contacts, strips)
@@ -200,15 +206,14 @@ def linearise_edges(
     contacts, n = level.shape
     realisations = strips.rows.shape[1]
     sums, scaled = np.empty(strips.rows.shape), np.empty(wear.shape)
-    sum_of_wear(strips, wear, sums)
+    sum_of_wear(strips, active, wear, sums)
     for k in range(contacts):
         one, other = strips.bodies[k // realisations, 0], strips.bodies[k // realisations, 1]
         v = k % realisations
-        for i in range(n):
-            if not strips.resolved[v]:
-                gaps[k, i] = strips.gap[k, i] + strips.base[one, v, i] + strips.base[other, v, i]
-                slopes[k, i], scaled[0, k, i], scaled[1, k, i] = 1.0, 0.0, 0.0
-                continue
+        for i in range(0 if strips.resolved[v] or not active[v] else n):
+            gaps[k, i] = strips.gap[k, i] + strips.base[one, v, i] + strips.base[other, v, i]
+            slopes[k, i] = 1.0
+        for i in range(n if strips.resolved[v] and active[v] else 0):
             ahead, grown, _ = by_others(strips, wear, sums, k, i)
             part = part_at(strips, k, i, level[k, i], grown)
             base = strips.base[one, v, i] + strips.base[other, v, i]
@@ -227,11 +232,12 @@ def linearise_edges(
                 scaled[side, k, i] = beyond * wear[side, k, i]
     if contacts == realisations:
         return
-    sum_of_wear(strips, scaled, sums)
+    sum_of_wear(strips, active, scaled, sums)
     for k in range(contacts):
-        for i in range(n if strips.resolved[k % realisations] else 0):
+        v = k % realisations
+        for i in range(n if strips.resolved[v] and active[v] else 0):
             for side in range(2):
-                b, v = strips.bodies[k // realisations, side], k % realisations
+                b = strips.bodies[k // realisations, side]
                 share = share_ahead(strips, strips.part[k, i], b, v, i)
                 gaps[k, i] -= share * (sums[b, v, i] - scaled[side, k, i])
 
@@ -254,7 +260,7 @@ def compare_edges(
     ----------
     strips : EdgeStrips
     active : ndarray of bool, shape (realisations,)
-        Realisations whose depth is updated.
+        Realisations whose depth and result are computed; the results of others are 0.
     gaps, slopes : ndarray, shape (contacts, strips)
         From `linearise_edges`.
     linear, apart, loads : ndarray, shape (contacts, strips)
@@ -273,13 +279,12 @@ def compare_edges(
     contacts, n = level.shape
     realisations = len(active)
     sums, rest = np.empty(strips.rows.shape), np.zeros(realisations)
-    sum_of_wear(strips, wear, sums)
+    sum_of_wear(strips, active, wear, sums)
     for k in range(contacts):
         one, other = strips.bodies[k // realisations, 0], strips.bodies[k // realisations, 1]
         v = k % realisations
-        for i in range(n if strips.resolved[v] else 0):
-            if active[v]:
-                level[k, i] = gaps[k, i] + linear[k, i] - apart[k, i] - strips.gap[k, i]
+        for i in range(n if strips.resolved[v] and active[v] else 0):
+            level[k, i] = gaps[k, i] + linear[k, i] - apart[k, i] - strips.gap[k, i]
             ahead, grown, joint = by_others(strips, wear, sums, k, i)
             part = part_at(strips, k, i, level[k, i], grown)
             base = strips.base[one, v, i] + strips.base[other, v, i]
@@ -289,8 +294,8 @@ def compare_edges(
                 rest[v] = max(rest[v], mean - joint)
             elif slopes[k, i] == np.inf:
                 rest[v] = max(rest[v], own)
-                if active[v]:  # loaded ahead of the predicted edge, which is now in its middle
-                    level[k, i] = max(level[k, i], strips.first[k, i] + grown)
+                # loaded ahead of the predicted edge, which is now in its middle
+                level[k, i] = max(level[k, i], strips.first[k, i] + grown)
             else:
                 rest[v] = max(rest[v], abs(mean - own - joint))
     return rest
@@ -331,7 +336,7 @@ def end_edges(
     contacts, n = level.shape
     rows, realisations, _ = worn.shape
     sums, crossed = np.empty(worn.shape), np.empty(worn.shape, np.bool_)
-    sum_of_wear(strips, wear, sums)
+    sum_of_wear(strips, strips.resolved, wear, sums)
     for b in range(rows):
         for v in range(realisations):
             for i in range(n):

@@ -154,6 +154,7 @@ def linearise_step(
     line_load: FloatArray,
     wear: FloatArray,
     exponents: FloatArray,
+    active: BoolArray,
     about: FloatArray,
     compliance: FloatArray,
 ) -> None:
@@ -166,6 +167,8 @@ def linearise_step(
     line_load, exponents : ndarray, shape (contacts, strips)
     wear : ndarray, shape (2, contacts, strips)
         As in `linearised_wear`.
+    active : ndarray of bool, shape (realisations,)
+        Realisations that have not converged yet; the results of others remain.
     about : ndarray, shape (5, contacts, strips)
         Results: `gaps` and `slopes` of `linearise_edges`; `opened` and both rows of `constant` of
         `linearised_wear`.
@@ -174,9 +177,9 @@ def linearise_step(
     """
     gaps, slopes = about[0], about[1]
     strips = borrowed(edge_strips(bodies, resolved, gap, depths, part, of_bodies, of_contacts))
-    linearise_edges(strips, of_contacts[2], wear, gaps, slopes)
+    linearise_edges(strips, active, of_contacts[2], wear, gaps, slopes)
     linearised_wear(
-        line_load, wear, exponents, slopes, bodies, gaps, compliance, about[2], about[3:]
+        line_load, wear, exponents, slopes, bodies, gaps, active, compliance, about[2], about[3:]
     )
 
 
@@ -221,7 +224,7 @@ def compare_step(
     greatest_exponent : float
         Upper bound of the exponents.
     active : ndarray of bool, shape (realisations,)
-        Realisations that have not converged yet.
+        Realisations that have not converged yet; the results of others remain.
     worn : ndarray, shape (bodies, realisations, strips)
         Result: wear of the bodies by the formula [m].
 
@@ -401,7 +404,7 @@ def compile_implicit_step() -> None:
         *(*strips, strip, wear, apart, about, compliance, strip, strip, wear.copy(), one, 1.0),
         *(resolved, rows.copy()),
     )
-    linearise_step(*strips, strip, wear, apart, about, compliance)
+    linearise_step(*strips, strip, wear, apart, resolved, about, compliance)
     begin_step(
         *(spans, order, one, one, one, past, sums, sums, rows, bodies, strip, one, wear, one),
         *(strip, strip, strip, resolved, resolved, of_tests, total, total),

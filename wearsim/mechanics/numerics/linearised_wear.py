@@ -26,6 +26,7 @@ def linearised_wear(
     slopes: FloatArray,
     bodies: IntArray,
     gap: FloatArray,
+    active: BoolArray,
     compliance: FloatArray,
     opened: FloatArray,
     constant: FloatArray,
@@ -49,6 +50,8 @@ def linearised_wear(
         Numbers of the two bodies of each contact, less than twice the number of contacts.
     gap : ndarray, shape (contacts, strips)
         Gap without this wear [m].
+    active : ndarray of bool, shape (realisations,)
+        Realisations whose results are computed.
     compliance : ndarray, shape (realisations, contacts each, 2, strips)
         Result: e u_0/(s q_0) [m/(N/m)]; u_0/q_0 is interpolated to strips without load.
     opened : ndarray, shape (contacts, strips)
@@ -62,28 +65,44 @@ def linearised_wear(
     worn[:] = 0.0
     for k in range(contacts):
         c, v = k // realisations, k % realisations
-        for side in range(2):
-            last = -1
+        for side in range(2 if active[v] else 0):
+            b = bodies[c, side]
             for i in range(n):
                 constant[side, k, i] = (1.0 - exponents[k, i]) * wear[side, k, i] / slopes[k, i]
-                worn[bodies[c, side], v, i] += constant[side, k, i]
-                if not line_load[k, i] > 0.0:
-                    continue
-                here = wear[side, k, i] / line_load[k, i]
-                start = compliance[v, c, side, last] if last >= 0 else here
-                for j in range(last + 1, i):
-                    part = (j - last) / (i - last) if last >= 0 else 1.0
-                    compliance[v, c, side, j] = start + (here - start) * part
-                compliance[v, c, side, i] = here
-                last = i
-            for j in range(last + 1, n):
-                compliance[v, c, side, j] = compliance[v, c, side, last] if last >= 0 else 0.0
+                worn[b, v, i] += constant[side, k, i]
+                loaded = line_load[k, i] > 0.0
+                compliance[v, c, side, i] = wear[side, k, i] / line_load[k, i] if loaded else 0.0
+            fill_unloaded(line_load[k], compliance[v, c, side])
             for i in range(n):
                 compliance[v, c, side, i] *= exponents[k, i] / slopes[k, i]
     for k in range(contacts):
         c, v = k // realisations, k % realisations
-        for i in range(n):
-            opened[k, i] = gap[k, i] + (worn[bodies[c, 0], v, i] + worn[bodies[c, 1], v, i])
+        one, other = bodies[c, 0], bodies[c, 1]
+        for i in range(n if active[v] else 0):
+            opened[k, i] = gap[k, i] + (worn[one, v, i] + worn[other, v, i])
+
+
+@subroutine
+def fill_unloaded(line_load: FloatArray, values: FloatArray) -> None:
+    """Interpolate values to the strips without load; beyond the loaded ones they are constant.
+
+    Parameters
+    ----------
+    line_load, values : ndarray, shape (strips,)
+        Values of strips without load are overwritten; 0 if no strip is loaded.
+    """
+    last, n = -1, len(values)
+    for i in range(n):
+        if not line_load[i] > 0.0:
+            continue
+        if last < i - 1:
+            start = values[last] if last >= 0 else values[i]
+            for j in range(last + 1, i):
+                part = (j - last) / (i - last) if last >= 0 else 1.0
+                values[j] = start + (values[i] - start) * part
+        last = i
+    for j in range(last + 1, n):
+        values[j] = values[last] if last >= 0 else 0.0
 
 
 @subroutine
@@ -122,7 +141,7 @@ def wear_of_bodies(
     slopes : ndarray, shape (contacts, strips)
         As in `linearised_wear`.
     active : ndarray of bool, shape (realisations,)
-        Realisations whose exponents are updated.
+        Realisations whose exponents and results are computed; the wear of others remains.
     exponents : ndarray, shape (contacts, strips)
         Updated by the two solutions in strips whose load has changed.
     worn : ndarray, shape (bodies, realisations, strips)
@@ -134,17 +153,17 @@ def wear_of_bodies(
     -------
     ndarray, shape (3, realisations)
         Greatest opening less the linearised one, greatest opening, and greatest depth of both
-        bodies of a contact, infinite without any [m].
+        bodies of a contact, infinite without any [m]. Those of others are 0, 0 and infinite.
     """
     contacts, n = loads.shape
     rows, realisations = worn.shape[0], worn.shape[1]
     part, scaled = np.empty((rows, realisations, n)), np.empty((rows, realisations, n))
-    worn[:] = 0.0
-    part[:] = 0.0
-    scaled[:] = 0.0
+    for v in range(realisations):
+        for b in range(rows if active[v] else 0):
+            worn[b, v, :], part[b, v, :], scaled[b, v, :] = 0.0, 0.0, 0.0
     for k in range(contacts):
         c, v = k // realisations, k % realisations
-        for side in range(2):
+        for side in range(2 if active[v] else 0):
             body = bodies[c, side]
             for i in range(n):
                 worn[body, v, i] += wear[side, k, i]
@@ -160,7 +179,7 @@ def wear_of_bodies(
     sizes = np.empty((3, realisations))
     for v in range(realisations):
         difference, greatest_opening, deepest = 0.0, 0.0, 0.0
-        for c in range(len(bodies)):
+        for c in range(len(bodies) if active[v] else 0):
             one, other, k = bodies[c, 0], bodies[c, 1], c * realisations + v
             for i in range(n):
                 opening = worn[one, v, i] + worn[other, v, i]

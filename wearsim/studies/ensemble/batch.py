@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
@@ -41,7 +42,7 @@ from wearsim.types import FloatArray, Grid, IntArray
 
 _RADII = ("cylinder_radius", "roller_radius", "rolling_speed")
 _ARRAYS = ("from_apex", "roller", "weight", "roller_drop", "slip_profile")
-MAX_BATCH = 128  # realisations in one batch; larger batches are not faster
+MAX_BATCH = 256  # realisations in one batch; larger batches are not faster
 MAX_STRIPS = 50_000  # strips of all contacts of a batch; about 100 arrays of this size are in use
 SCALARS = ("depth_error", "volume_error", "steps", "solves")
 Observables = dict[str, float]
@@ -193,15 +194,22 @@ def batch_groups(runs: Sequence[RealisationRun]) -> list[list[RealisationRun]]:
     """Return the tests in groups that can be stepped in one batch, or of one test each."""
     groups: list[list[RealisationRun]] = []
     for run in runs:
-        batched, strips = run.can_be_batched, run.problem.contacts_each * run.problem.grid.strips
-        limit = min(MAX_BATCH, max(1, MAX_STRIPS // strips))
-        for group in groups if batched else []:
-            if len(group) < limit and group[0].can_be_batched and run.can_join(group[0]):
+        for group in groups if run.can_be_batched else []:
+            if group[0].can_be_batched and run.can_join(group[0]):
                 group.append(run)
                 break
         else:
             groups.append([run])
-    return groups
+    return [part for group in groups for part in _parts(group)]
+
+
+def _parts(group: list[RealisationRun]) -> list[list[RealisationRun]]:
+    """Return tests that can be joined in batches of almost equal sizes."""
+    problem = group[0].problem
+    limit = min(MAX_BATCH, max(1, MAX_STRIPS // (problem.contacts_each * problem.grid.strips)))
+    count = math.ceil(len(group) / limit)
+    ends = [len(group) * part // count for part in range(count + 1)]
+    return [group[start:end] for start, end in pairwise(ends)]
 
 
 def observables_of(

@@ -10,9 +10,11 @@ from collections.abc import Callable
 import numpy as np
 
 SECONDS = 4.0  # duration of a batch; a test costs a third more in batches of 20 than of 40
-GROWTH = 8  # greatest ratio of the size of a batch to the greatest before it
+GROWTH = 32  # greatest ratio of the size of a batch to the greatest before it
 MOST_IN_BATCH = 256
-LEAST_IN_BATCH = 16  # of those left, if they take less; a batch costs as much as five tests more
+# of those left, a batch costs as much as seven tests more: the least, and the part of its share
+# that a worker takes, since their durations are estimates
+LEAST_IN_BATCH, PART_OF_SHARE = 16, 0.75
 BATCHES = 3  # finished batches from which the time left is estimated,
 RECENT = 8  # and the greatest number of them
 
@@ -37,6 +39,8 @@ class BatchSizes:
         self._run = self._largest = 0
         # time and number of realisations after each of the last batches
         self._recent: deque[tuple[float, int]] = deque(maxlen=RECENT)
+        # start and size of the batches in progress
+        self._running: list[tuple[float, int]] = []
 
     def next(self, left: int, workers: int) -> int:
         """Return the batch size for `SECONDS`, limited so that several workers end together.
@@ -47,21 +51,36 @@ class BatchSizes:
         Parameters
         ----------
         left : int
-            Realisations that are not finished.
+            Realisations that are not finished, those in progress included.
         workers : int
         """
-        share = math.ceil(left / workers)
-        together = share if workers == 1 else max(math.ceil(share / 2), min(share, LEAST_IN_BATCH))
-        most = max(min(together, MOST_IN_BATCH, GROWTH * self._largest), 1)
-        rate = self.rate
+        rate, now = self.rate, self._clock()
         if len(self._recent) > 1:
             (start, before), (end, run) = self._recent[0], self._recent[-1]
             rate = (run - before) / max(end - start, 1e-9)
-        return int(np.clip(SECONDS * rate / workers, 1, most))
+        each = rate / workers
+        # a batch that has just finished may be among those in progress
+        done = sum(min(each * (now - start), size) for start, size in self._running[:workers])
+        share = (left - done) / workers
+        together = share if workers == 1 else max(PART_OF_SHARE * share, LEAST_IN_BATCH)
+        most = max(min(math.ceil(together), MOST_IN_BATCH, GROWTH * self._largest), 1)
+        return int(np.clip(SECONDS * each, 1, most))
+
+    def started(self, count: int) -> None:
+        """Note that a batch of realisations has started."""
+        self._running.append((self._clock(), count))
+
+    def abandoned(self) -> None:
+        """Note that no batch is in progress any more."""
+        self._running.clear()
 
     def finished(self, count: int) -> None:
         """Note that a batch of realisations has finished."""
         now = self._clock()
+        for batch in self._running:
+            if batch[1] == count:
+                self._running.remove(batch)
+                break
         self._run += count
         self._largest = max(self._largest, count)
         self._recent.append((now, self._run))

@@ -263,6 +263,7 @@ class EnsembleWork:
     def _batches(self, numbers: Iterable[int]) -> Iterator[list[int]]:
         """Yield batches of numbers; results do not depend on their composition."""
         remaining = iter(numbers)
+        self._batch_sizes.abandoned()
         while True:
             workers = max(self.pool.workers, 1)
             left = self.total - int((self.file.status != PENDING).sum())
@@ -271,6 +272,7 @@ class EnsembleWork:
             batch = list(islice(remaining, size))
             if not batch:
                 return
+            self._batch_sizes.started(len(batch))
             yield batch
 
     def _take(self, outcomes: Sequence[Outcome]) -> None:

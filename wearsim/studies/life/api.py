@@ -130,15 +130,13 @@ def life(
         settings = replace(settings, variable=asdict(value))
     if output is not None:
         check_output(output, force, scenario.paths)
-    runner, content = _prepared(scenario, settings, aim)
     with _results_path(output) as path:
         hands = workers, scheduler, progress, on_progress, stop_requested, on_notice
-        with (
-            watched_executor(scenario, settings.plain, *hands) as (watch, pool),
-            EnsembleFile.create(path, *content, storage) as file,
-        ):
-            runner.compile_kernels()
-            EnsembleWork(file, runner, aim, pool, watch, stop_requested).finish()
+        with watched_executor(scenario, settings.plain, *hands) as (watch, pool):
+            runner, content = _prepared(scenario, settings, aim)
+            with EnsembleFile.create(path, *content, storage) as file:
+                runner.compile_kernels()
+                EnsembleWork(file, runner, aim, pool, watch, stop_requested).finish()
         return _opened(path, in_memory=output is None)
 
 

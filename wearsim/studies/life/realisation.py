@@ -21,6 +21,7 @@ from wearsim.studies.life.factor import NEGLIGIBLE, RARE, ExactFactor, exact_fac
 from wearsim.studies.life.rare.draws import changes_of, log_weight
 from wearsim.studies.life.stored_settings import LifeSettings
 from wearsim.studies.run.draws import Drawer
+from wearsim.studies.run.grid import shared_strips
 from wearsim.types import Grid
 
 if TYPE_CHECKING:
@@ -85,6 +86,11 @@ class LevelRunner(RealisationRunner):
     def log_weight(self, realisation: int) -> float:
         """Return the logarithm of the weight of a realisation; 0 without a shift."""
         return log_weight(self.drawer, self.shift, realisation, self.mixture) if self.shift else 0.0
+
+    @cached_property
+    def start(self) -> Grid:
+        """Strips with which all realisations start that fit on them."""
+        return shared_strips(self.scenario, to_limits=True)
 
     @cached_property
     def drawer(self) -> Drawer:

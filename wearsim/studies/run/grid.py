@@ -10,7 +10,7 @@ import numpy as np
 
 from wearsim.errors import Mistake, ScenarioError, mistake_in
 from wearsim.evolution.strips import JOINED, LEAST_LOADED, Growth, Surfaces, same_strips
-from wearsim.plugins import ContactModel
+from wearsim.plugins import BODIES, ContactModel
 from wearsim.scenario import Scenario
 from wearsim.scenario.parse.fields import CONTACT_FIELDS
 from wearsim.scenario.tables.plain import DEFAULT_TOLERANCE, LEAST_TOLERANCE
@@ -251,14 +251,19 @@ def strips_of_run(setup: Setup) -> Grid:
     return Grid.spanning(centre - 0.5 * width, centre + 0.5 * width, strips)
 
 
-def shared_strips(scenario: Scenario) -> Grid:
+def shared_strips(scenario: Scenario, to_limits: bool = False) -> Grid:
     """Return the strips with which the realisations of a scenario start that fit on them.
 
     They are those with every input that is drawn for a test at its mean, wider by its scatter.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    to_limits : bool
+        Whether tests end at the limits of the scenario, which their strips then cover.
     """
-    grid = strips_of_run(
-        Setup(scenario, passes=tuple(item for item in scenario.random if item.is_redrawn))
-    )
+    setup = Setup(scenario, passes=tuple(item for item in scenario.random if item.is_redrawn))
+    grid = strips_of_run(setup)
     fixed = scenario.contact.width is not None or scenario.contact.strips is not None
     if fixed or not scenario.random or ends_roller(scenario, *grid.edges):
         return grid
@@ -266,7 +271,30 @@ def shared_strips(scenario: Scenario) -> Grid:
     tilting = tuple(item for item in ranged if CONTACT_FIELDS.keys() >= set(item.keys))
     drawn = Setup(scenario, passes=tilting)
     tilts = float(np.ptp(drawn.tilt_shift(drawn.range_of("tilt"))))
-    return lattice(grid, 0.5 * (1.25 * grid.strips * grid.spacing + tilts))
+    half = 0.5 * 1.25 * grid.strips * grid.spacing
+    if to_limits:
+        half = min(half, setup.reach_of(half_width_at_limits(setup)))
+    return lattice(grid, half + 0.5 * tilts)
+
+
+def half_width_at_limits(setup: Setup) -> float:
+    """Return half the greatest width of a groove before a limit of depth or width [m].
+
+    The depth of the rollers is that of the cylinder times the ratio of their wear, or less where
+    they wear less elsewhere around a cam. It is infinite without such a limit.
+    """
+    scenario, limit, profile = setup.scenario, setup.scenario.limit, setup.start_extent
+    half, speed = math.inf if limit.width is None else 0.5 * limit.width, scenario.rolling_speed
+    law = None if scenario.wear is None else scenario.wear.built
+    if law is None or limit.depth is None:
+        return half
+    of_cylinder, of_roller = (law.depth_per_dissipation(body, speed) for body in BODIES)
+    if not of_cylinder or of_roller is None:
+        return half
+    overrollings = setup.turn.mean_radius / scenario.roller.radius / scenario.operation.rollers
+    depth = limit.depth * (1.0 + overrollings * of_roller / of_cylinder)
+    relief = 0.0 if profile is None else profile.relief
+    return min(half, float(scenario.axial_gap.half_width(depth + relief)))
 
 
 def lattice(grid: Grid, half: float) -> Grid:

@@ -280,7 +280,11 @@ class Setup:
     @cached_property
     def final(self) -> float:
         """Distance from `centre` of the edges of the final groove, with a margin [m]."""
-        return self.fresh + 1.1 * self.half_width(self.greatest_load)
+        return self.reach_of(self.half_width(self.greatest_load))
+
+    def reach_of(self, half_width: float) -> float:
+        """Return the distance from `centre` of the edges of a groove, with a margin [m]."""
+        return self.fresh + 1.1 * half_width
 
     def positions_of(self, inputs: Mapping[str, FloatArray]) -> FloatArray:
         """Return contact positions on an unworn cylinder [m].
