@@ -242,6 +242,18 @@ class Noisy(Counting):
         return replace(found, dissipation=factor * found.dissipation)
 
 
+class NoisyAfterFirst(Noisy):
+    """Contact model whose power changes from call to call in all tests but the first of three."""
+
+    def solve(self, batch, *arguments, **options):
+        found = Counting.solve(self, batch, *arguments, **options)
+        self.calls = getattr(self, "calls", 0) + 1
+        factors = np.full(len(batch), 1.0 + 0.5 * self.noise * (-1.0) ** self.calls)
+        if len(batch) == 3:
+            factors[0] = 1.0
+        return replace(found, dissipation=factors[:, None] * found.dissipation)
+
+
 def test_tolerance_of_an_iteration_is_relaxed_every_twenty_times(grooved):
     problem, _, _ = built(contact__strips=41)
     step, exact = np.array([100.0]), problem.iteration_tolerance * CONVERGED
@@ -260,3 +272,25 @@ def test_tolerance_of_an_iteration_is_relaxed_every_twenty_times(grooved):
     # where strips are cut, the step is repeated on whole strips instead
     assert end.solves - state.solves == 21
     assert noisy.model.solved == 20 + 21
+
+
+def test_steps_that_do_not_converge_are_repeated_without_the_others(grooved):
+    cut, state = grooved
+    state = state.replaced(order=np.array([1]))
+    several, passes = np.zeros(3, dtype=np.int64), np.full(3, 100.0)
+    single = replace(cut, model=Noisy(cut.model, 0.1))
+    alone = implicit_step(single, state, passes[:1])
+    many = replace(cut.at(several), model=NoisyAfterFirst(cut.model, 0.1))
+    found = implicit_step(many, state.at(several), passes)
+    quiet = implicit_step(cut, state, passes[:1])
+    # the first test converges, and its contact is not solved again for the others
+    assert many.model.solved == quiet.solves - state.solves + 2 * single.model.solved
+    np.testing.assert_array_equal(found.cylinder_depth[..., 0, :], quiet.cylinder_depth[..., 0, :])
+    for place in (1, 2):
+        depth = found.cylinder_depth[..., place, :]
+        np.testing.assert_allclose(depth, alone.cylinder_depth[..., 0, :], rtol=1e-6)
+    whole = edges.without_edges(cut, state).at(several)
+    whole = whole.replaced(cylinder_depth=0.0 * whole.cylinder_depth)
+    with pytest.raises(StepError, match="did not converge") as raised:
+        implicit_step(replace(many, model=NoisyAfterFirst(cut.model, 0.5)), whole, passes)
+    assert raised.value.places == (1, 2)

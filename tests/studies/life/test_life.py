@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
+from tests.evolution import SCENARIOS
 from tests.fixed_batches import batches_of
 from tests.studies.ensemble_cases import LOGNORMAL, differences, small
 from tests.studies.random_examples import WANDERING
 from wearsim.errors import Interrupted, ResultsFileError, ScenarioError
-from wearsim.scenario import Scenario
+from wearsim.scenario import Scenario, load_scenario
 from wearsim.studies.ensemble.api import resume_ensemble
 from wearsim.studies.ensemble.file.parts import read_ensemble
 from wearsim.studies.life import settings
@@ -26,6 +27,7 @@ from wearsim.studies.life.realisation import LifeRunner
 from wearsim.studies.life.result import LifeResult
 from wearsim.studies.life.settings import design_variable, parse_life
 from wearsim.studies.opening import open_results
+from wearsim.studies.run.grid import shared_strips
 from wearsim.studies.run.run import run
 
 LOAD = {"distribution": "lognormal", "median": "300 N", "factor": 1.1}
@@ -216,6 +218,34 @@ def test_first_of_two_limits_ends_each_life(exact: LifeResult, tmp_path: Path) -
     assert sum(shares.values()) == pytest.approx(1.0)
     assert 0.0 < shares["volume"] < 1.0
     assert (both.lives <= exact.lives * (1.0 + 1e-5)).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("cam-life", {}),
+        ("cam-life", {"limit.depth": "1 mm", "limit.width": "8 mm", "cam.stations": 1}),
+        ("rig-life", {"wear.roller.k_over_h": "5e-12 1/Pa", "limit.depth": "15 um"}),
+    ],
+)
+def test_strips_of_lives_cover_the_grooves_at_the_limits(
+    monkeypatch: pytest.MonkeyPatch, name: str, changes: dict[str, object]
+) -> None:
+    scenario = load_scenario(SCENARIOS / f"{name}.toml", overrides=changes)
+    grid, whole = shared_strips(scenario, to_limits=True), shared_strips(scenario)
+    assert 5 < grid.strips < whole.strips
+    assert (whole.strips - grid.strips) % 2 == 0
+    assert grid.spacing == pytest.approx(whole.spacing)
+    found = life(scenario, 3, scheduler="serial")
+    with monkeypatch.context() as patched:
+        patched.setattr(
+            "wearsim.studies.life.realisation.shared_strips",
+            lambda scenario, to_limits: shared_strips(scenario),
+        )
+        known = life(scenario, 3, scheduler="serial")
+    np.testing.assert_allclose(found.values("life"), known.values("life"), rtol=1e-9)
+    width = found.at_end("width").max()
+    assert 0.5 * grid.strips * grid.spacing < width < grid.strips * grid.spacing
 
 
 def test_limit_that_is_exceeded_when_fresh_gives_life_zero(tmp_path: Path) -> None:
