@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import wearsim
-from wearsim.evolution.observed_errors import COVER, observed_errors
+from wearsim.evolution.observed_errors import COVER, COVER_OF_FREE, observed_errors
 from wearsim.evolution.strip_errors import Course
 from wearsim.types import FloatArray
 
@@ -93,20 +93,21 @@ def test_error_under_a_logged_load_is_not_that_of_interpolation(
 
 
 def of_exact_sizes(
-    course: Course | None, passes: FloatArray, observed: dict[str, FloatArray]
+    course: Course | None, passes: FloatArray, observed: dict[str, FloatArray], free: bool = False
 ) -> dict[str, FloatArray]:
     """Return the errors of observables of a test whose depths and volume have none."""
     sizes = np.ones((3, len(passes)))
-    return observed_errors(course, passes, observed, sizes, 0.0 * sizes)
+    return observed_errors(course, passes, observed, sizes, 0.0 * sizes, free=free)
 
 
-def test_error_is_the_greatest_of_the_last_differences() -> None:
+@pytest.mark.parametrize(("free", "cover"), [(False, COVER), (True, COVER_OF_FREE)])
+def test_error_is_the_greatest_of_the_last_differences(free: bool, cover: float) -> None:
     passes = np.array([0.0, 10.0, 20.0, 40.0, 80.0])
     pressure = np.array([3.0, 2.0, 2.0, 2.0, 2.0])
     other = pressure * np.array([1.0, 1.1, 1.0, 1.0, 1.0])
     course = Course(passes[1:].tolist(), observed={"peak_pressure": other})
-    found = of_exact_sizes(course, passes, {"peak_pressure": pressure})["peak_pressure"]
-    np.testing.assert_allclose(found[[0, 1]], [0.0, COVER * 0.2], atol=1e-12)
+    found = of_exact_sizes(course, passes, {"peak_pressure": pressure}, free)["peak_pressure"]
+    np.testing.assert_allclose(found[[0, 1]], [0.0, cover * 0.2], atol=1e-12)
     np.testing.assert_allclose(found[3:], 0.0, atol=1e-12)  # it is no longer recent
 
 

@@ -36,9 +36,9 @@ from wearsim.types import FloatArray
 # sign of that of the test. In the rig's test against rigid bodies, of the pressures of whole strips
 # a factor of 1 covers 70 % to 80 %, and this factor at least 96 %
 COVER = 1.5
-# the same of the power: that of free rollers, whose tractions change sign along the contact, may
-# converge more slowly than in proportion to the width of the strips
-COVER_OF_POWER = 2.0
+# the same of free rollers: their creepage follows from tractions of both signs along the contact,
+# whose sum may converge more slowly than in proportion to the width of the strips
+COVER_OF_FREE = 2.5
 # relative difference from other steps above which a pressure of the coarse test is a peak that the
 # test does not have: where edges are resolved, the long steps of the coarse test raise its pressure
 # by up to a half after strips have come into contact, while its errors by strips vary by 1 %
@@ -91,6 +91,7 @@ def observed_errors(
     roller_width: float = math.inf,
     load: Callable[[FloatArray], FloatArray] | None = None,
     feedback: bool = True,
+    free: bool = False,
 ) -> dict[str, FloatArray]:
     """Return the estimated errors of observables of a test.
 
@@ -114,6 +115,8 @@ def observed_errors(
         Returns the load before feedback at some passes [N]; None for a constant one.
     feedback : bool
         Whether the normal force depends on wear or power.
+    free : bool
+        Whether the rollers are free.
     """
     if not observed:
         return {}
@@ -162,12 +165,8 @@ def observed_errors(
         widths.append(fine_values.shape[1])
     greatest = _greatest_of_last(common, np.concatenate(differences, axis=1))
     part = np.column_stack([np.interp(at_passes, at_common, column) for column in greatest.T])
-    estimates = {
-        name: (COVER_OF_POWER if name == "power" else COVER) * columns
-        for name, columns in zip(
-            observed, np.split(part, np.cumsum(widths)[:-1], axis=1), strict=True
-        )
-    }
+    part *= COVER_OF_FREE if free else COVER
+    estimates = dict(zip(observed, np.split(part, np.cumsum(widths)[:-1], axis=1), strict=True))
     worn = np.array([np.maximum(sizes[0], sizes[1]), sizes[2]])
     least = by_strips[:2] / np.where(worn > 0.0, worn, np.inf)
     errors, has_edges = {}, observed.keys() >= {"width", *OF_EDGES}

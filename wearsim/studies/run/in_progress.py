@@ -222,6 +222,7 @@ class RunInProgress:
             *(None if crown is None else crown[:, 0], spacing, width_between_edges(self.scenario)),
             partial(load_before_feedback, problem) if varies else None,
             feedback=problem.has_spring or bool(problem.terms),
+            free=problem.free,
         )
 
     def _check_errors(self, data: RunData) -> None:
