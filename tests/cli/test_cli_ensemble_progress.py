@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 
 import pytest
 from rich.console import Console
@@ -36,13 +37,18 @@ def test_progress_omits_unknown_values() -> None:
     assert progress_text(none) == "0 of 5 realisations, 5 failed, 2/s"
 
 
-def test_progress_lines_are_a_second_apart(capsys: pytest.CaptureFixture[str]) -> None:
+def test_progress_lines_are_a_second_apart_but_for_the_last(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     now = [0.0]
     watch = EnsembleWatcher(quiet=False, now=lambda: now[0])
     for time in (0.5, 1.1, 1.2, 2.2):
         now[0] = time
         watch(PROGRESS)
-    assert capsys.readouterr().err.splitlines() == [progress_text(PROGRESS)] * 2
+    last = replace(PROGRESS, done=4997, left=0.0)  # with three that have failed
+    watch(last)
+    lines = [*[progress_text(PROGRESS)] * 2, progress_text(last)]
+    assert capsys.readouterr().err.splitlines() == lines
     assert watch.workers == "2 processes"
 
 

@@ -243,10 +243,10 @@ class EnsembleWatcher(_Noticing):
     workers = ""
 
     def __call__(self, progress: EnsembleProgress) -> None:
-        """Store the workers and show the progress."""
-        self.workers = progress.workers
-        self.advance(progress.done + progress.failed, progress.requested)
-        self.show(progress_text(progress, self.columns))
+        """Store the workers and show the progress, that of the last batch always."""
+        self.workers, over = progress.workers, progress.done + progress.failed
+        self.advance(over, progress.requested)
+        self.show(progress_text(progress, self.columns), always=over == progress.requested)
 
 
 def progress_text(progress: EnsembleProgress, columns: float = math.inf) -> str:
