@@ -301,9 +301,10 @@ def implicit_step(
     as the depths, so that Archard's wear law holds to round-off. Passes are counted one by one: the
     formula is applied to the depths half a pass later, ``u + f/2`` with the wear per pass f, whose
     derivative is f up to terms of second order in f. A step in which a depth or the energy would
-    decrease is repeated at second order, and at first order if they still decrease; so is one in
-    which contact would be lost. A step in which the load jumps is of first order. The state
-    returned has the order of its formula. `near` is as of `step_by_formula`.
+    decrease is repeated at second order, and at first order if they still decrease; one that does
+    not converge, or in which contact would be lost, at first order on whole strips. A step in which
+    the load jumps is of first order. The state returned has the order of its formula. `near` is as
+    of `step_by_formula`.
 
     Raises
     ------
@@ -369,7 +370,7 @@ def _step_of(
 
 
 def _has_simpler_step(state: WearState, order: IntArray) -> BoolArray:
-    """Return for which tests a step of first order in which no strips are cut is another one."""
+    """Return for which tests a step of first order on whole strips differs from the present one."""
     resolved = state.separation is not None and ~edges.unresolved(state)
     return np.asarray((order > 1) | resolved)
 
@@ -381,7 +382,7 @@ def _step_of_first_order(
     conditions: Conditions,
     places: IntArray,
 ) -> WearState:
-    """Return some tests of a batch after steps of first order in which no strips are cut."""
+    """Return some tests of a batch after steps of first order on whole strips."""
     here, start, lengths, own = _step_of(problem, state, passes, conditions, places)
     if start.separation is not None:
         start = edges.without_edges(here, start)

@@ -192,8 +192,8 @@ def step_by_formula(
         if iteration in {RELAXATION_INTERVAL, MAX_FIXED_POINT}:
             # with a relaxed tolerance a step without wear might pass where strips are cut
             stopped = active if iteration == MAX_FIXED_POINT else active & resolved
-            last = np.nan_to_num(change / depth, nan=np.inf, posinf=np.inf)
-            unsolved = np.where(stopped, last, unsolved)
+            last = np.divide(change, depth, out=unsolved.copy(), where=stopped)
+            unsolved = np.nan_to_num(last, nan=np.inf, posinf=np.inf)
             active &= ~stopped
         if not active.nonzero()[0].size:
             break

@@ -204,7 +204,7 @@ def batch_groups(runs: Sequence[RealisationRun]) -> list[list[RealisationRun]]:
 
 
 def _parts(group: list[RealisationRun]) -> list[list[RealisationRun]]:
-    """Return tests that can be joined in batches of almost equal sizes."""
+    """Divide tests that can be joined into batches of almost equal sizes."""
     problem = group[0].problem
     limit = min(MAX_BATCH, max(1, MAX_STRIPS // (problem.contacts_each * problem.grid.strips)))
     count = math.ceil(len(group) / limit)
