@@ -335,7 +335,8 @@ def implicit_step(
         if len(order) > 1 or is_edge or not _has_simpler_step(state, order)[0]:
             raise
         return _step_of_first_order(*step, np.zeros(1, dtype=np.int64))
-    if (failed := unsolved.nonzero()[0]).size:
+    if unsolved is not None:
+        failed = unsolved.nonzero()[0]
         final = np.where(_has_simpler_step(state, order), 0.0, unsolved)
         _check_convergence(state, passes, failed, final[failed])
         end = end.with_others(failed, _step_of_first_order(*step, failed))
@@ -392,10 +393,10 @@ def _step_of_first_order(
 
 
 def _check_convergence(
-    state: WearState, passes: FloatArray, places: IntArray, unsolved: FloatArray
+    state: WearState, passes: FloatArray, places: IntArray, unsolved: FloatArray | None
 ) -> None:
     """Raise StepError if the iteration of some tests of a batch, by place, did not converge."""
-    if (failed := places[unsolved > 0.0]).size:
+    if unsolved is not None and (failed := places[unsolved > 0.0]).size:
         first = failed[0]
         raise StepError(
             f"an implicit step of {passes[first]:.4g} passes from pass {state.passes[first]:.0f}"

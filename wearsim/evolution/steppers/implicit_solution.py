@@ -65,7 +65,7 @@ def step_by_formula(
     conditions: Conditions,
     order: IntArray,
     near: ContactBatchSolution | None = None,
-) -> tuple[WearState, BoolArray, FloatArray]:
+) -> tuple[WearState, BoolArray, FloatArray | None]:
     """Solve the equations of an implicit step.
 
     The equations are: depths = ``base + wear of worn_passes at the end``. The wear enters the
@@ -92,8 +92,9 @@ def step_by_formula(
         State after the step.
     decreased : ndarray of bool, shape (realisations,)
         Whether depths or energy decrease.
-    unsolved : ndarray, shape (realisations,)
-        Last relative change of the wear where the iteration did not converge, 0 where it did.
+    unsolved : ndarray, shape (realisations,), or None
+        Last relative change of the wear where the iteration did not converge, 0 where it did; None
+        if it did in all tests.
     """
     past, contacts, depths = state.past, state.contacts, state.stacked
     bodies, gap = problem.body_rows, problem.contact_gap
@@ -101,7 +102,8 @@ def step_by_formula(
     realisations, strips = passes.size, shape[1]
     # tests that resolve edges, whose depths or energy decrease, in a groove, and in progress
     resolved, decreased, in_groove, active = np.zeros((4, realisations), dtype=np.bool_)
-    active[:], unsolved = True, np.zeros(realisations)
+    active[:] = True
+    unsolved: FloatArray | None = None
     if past.part.size and not past.separation.size:  # strips in contact as wholes are counted
         in_groove[:] = have_groove(problem, state)
     # line loads and wear about which the wear is linearised
@@ -192,9 +194,11 @@ def step_by_formula(
         if iteration in {RELAXATION_INTERVAL, MAX_FIXED_POINT}:
             # with a relaxed tolerance a step without wear might pass where strips are cut
             stopped = active if iteration == MAX_FIXED_POINT else active & resolved
-            last = np.divide(change, depth, out=unsolved.copy(), where=stopped)
-            unsolved = np.nan_to_num(last, nan=np.inf, posinf=np.inf)
-            active &= ~stopped
+            if stopped.any():
+                last = np.zeros(realisations) if unsolved is None else unsolved
+                np.divide(change, depth, out=last, where=stopped)
+                unsolved = np.nan_to_num(last, nan=np.inf, posinf=np.inf)
+                active &= ~stopped
         if not active.nonzero()[0].size:
             break
         loads.used = loads.target
