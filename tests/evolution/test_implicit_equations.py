@@ -243,7 +243,7 @@ class Noisy(Counting):
 
 
 class NoisyAfterFirst(Noisy):
-    """Contact model whose power changes from call to call in all tests but the first of three."""
+    """Contact model with a noisy power, except in the first contact of a batch of three."""
 
     def solve(self, batch, *arguments, **options):
         found = Counting.solve(self, batch, *arguments, **options)

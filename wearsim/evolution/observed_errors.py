@@ -36,8 +36,8 @@ from wearsim.types import FloatArray
 # sign of that of the test. In the rig's test against rigid bodies, of the pressures of whole strips
 # a factor of 1 covers 70 % to 80 %, and this factor at least 96 %
 COVER = 1.5
-# the same of free rollers: their creepage follows from tractions of both signs along the contact,
-# whose sum may converge more slowly than in proportion to the width of the strips
+# the same for free rollers. Their creepage is found from a sum of tractions of both signs, and the
+# error of this sum may decrease more slowly than the width of the strips
 COVER_OF_FREE = 2.5
 # relative difference from other steps above which a pressure of the coarse test is a peak that the
 # test does not have: where edges are resolved, the long steps of the coarse test raise its pressure

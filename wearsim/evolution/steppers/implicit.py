@@ -337,8 +337,8 @@ def implicit_step(
         return _step_of_first_order(*step, np.zeros(1, dtype=np.int64))
     if unsolved is not None:
         failed = unsolved.nonzero()[0]
-        final = np.where(_has_simpler_step(state, order), 0.0, unsolved)
-        _check_convergence(state, passes, failed, final[failed])
+        final = failed[~_has_simpler_step(state, order)[failed]]
+        _check_convergence(state, passes, final, unsolved[final])
         end = end.with_others(failed, _step_of_first_order(*step, failed))
         decreased[failed] = False
     several_rollers = problem.shape[1] > 1 and problem.shape[0] == 1

@@ -32,6 +32,7 @@ from wearsim.mechanics.numerics.piecewise_linear import Paths
 from wearsim.plugins import BODIES
 from wearsim.scenario import Scenario
 from wearsim.studies.cam.observables import observables_of_track
+from wearsim.studies.ensemble.batch_sizes import MOST_IN_BATCH
 from wearsim.studies.failures import too_deep_failure
 from wearsim.studies.fatigue.observables import fatigue_curves
 from wearsim.studies.run.assemble import coarse_stepper
@@ -42,7 +43,6 @@ from wearsim.types import FloatArray, Grid, IntArray
 
 _RADII = ("cylinder_radius", "roller_radius", "rolling_speed")
 _ARRAYS = ("from_apex", "roller", "weight", "roller_drop", "slip_profile")
-MAX_BATCH = 256  # realisations in one batch; larger batches are not faster
 MAX_STRIPS = 50_000  # strips of all contacts of a batch; about 100 arrays of this size are in use
 SCALARS = ("depth_error", "volume_error", "steps", "solves")
 Observables = dict[str, float]
@@ -206,7 +206,8 @@ def batch_groups(runs: Sequence[RealisationRun]) -> list[list[RealisationRun]]:
 def _parts(group: list[RealisationRun]) -> list[list[RealisationRun]]:
     """Divide tests that can be joined into batches of almost equal sizes."""
     problem = group[0].problem
-    limit = min(MAX_BATCH, max(1, MAX_STRIPS // (problem.contacts_each * problem.grid.strips)))
+    of_one = problem.contacts_each * problem.grid.strips
+    limit = min(MOST_IN_BATCH, max(1, MAX_STRIPS // of_one))
     count = math.ceil(len(group) / limit)
     ends = [len(group) * part // count for part in range(count + 1)]
     return [group[start:end] for start, end in pairwise(ends)]

@@ -11,10 +11,10 @@ import numpy as np
 
 SECONDS = 4.0  # duration of a batch; a test costs a third more in batches of 20 than of 40
 GROWTH = 32  # greatest ratio of the size of a batch to the greatest before it
-MOST_IN_BATCH = 256
-# of those left, a batch costs as much as seven tests more: the least, and the part of its share
-# that a worker takes, since their durations are estimates
-LEAST_IN_BATCH, PART_OF_SHARE = 16, 0.75
+MOST_IN_BATCH = 256  # larger batches are not faster
+LEAST_IN_BATCH = 16  # of those left, if they take less; a batch costs as much as seven tests more
+# part of the realisations left per worker that a batch takes, as their durations are estimates
+PART_OF_SHARE = 0.75
 BATCHES = 3  # finished batches from which the time left is estimated,
 RECENT = 8  # and the greatest number of them
 

@@ -260,7 +260,8 @@ def shared_strips(scenario: Scenario, to_limits: bool = False) -> Grid:
     ----------
     scenario : Scenario
     to_limits : bool
-        Whether tests end at the limits of the scenario, which their strips then cover.
+        Whether tests end at the limits of the scenario; strips then reach as far as the groove is
+        predicted at them.
     """
     setup = Setup(scenario, passes=tuple(item for item in scenario.random if item.is_redrawn))
     grid = strips_of_run(setup)
@@ -280,8 +281,8 @@ def shared_strips(scenario: Scenario, to_limits: bool = False) -> Grid:
 def half_width_at_limits(setup: Setup) -> float:
     """Return half the greatest width of a groove before a limit of depth or width [m].
 
-    The depth of the rollers is that of the cylinder times the ratio of their wear, or less where
-    they wear less elsewhere around a cam. It is infinite without such a limit.
+    The rollers are as deep as the cylinder times the ratio of the wear of both, or less on a cam
+    that wears less at other angles. The value is infinite without such a limit.
     """
     scenario, limit, profile = setup.scenario, setup.scenario.limit, setup.start_extent
     half, speed = math.inf if limit.width is None else 0.5 * limit.width, scenario.rolling_speed
@@ -291,8 +292,7 @@ def half_width_at_limits(setup: Setup) -> float:
     of_cylinder, of_roller = (law.depth_per_dissipation(body, speed) for body in BODIES)
     if not of_cylinder or of_roller is None:
         return half
-    overrollings = setup.turn.mean_radius / scenario.roller.radius / scenario.operation.rollers
-    depth = limit.depth * (1.0 + overrollings * of_roller / of_cylinder)
+    depth = limit.depth * (1.0 + setup.overrollings * of_roller / of_cylinder)
     relief = 0.0 if profile is None else profile.relief
     return min(half, float(scenario.axial_gap.half_width(depth + relief)))
 

@@ -282,6 +282,11 @@ class Setup:
         """Distance from `centre` of the edges of the final groove, with a margin [m]."""
         return self.reach_of(self.half_width(self.greatest_load))
 
+    @property
+    def overrollings(self) -> float:
+        """Overrollings of a point of a roller in a pass of the cylinder, or a turn of the cam."""
+        return self.turn.mean_radius / self.scenario.roller.radius / self.scenario.operation.rollers
+
     def reach_of(self, half_width: float) -> float:
         """Return the distance from `centre` of the edges of a groove, with a margin [m]."""
         return self.fresh + 1.1 * half_width
@@ -371,7 +376,7 @@ class Setup:
             ratio = min(float(np.hypot(longitudinal, yaw)) / saturated, 1.0)
             slipping = ratio * (2.0 - ratio)
         start = 0.0 if profile is None else profile.relief
-        share = turn.mean_radius / roller.radius / scenario.operation.rollers
+        share = self.overrollings
         half, speed, law = patch.b, scenario.rolling_speed, scenario.wear.built
         of_cylinder, of_roller = (law.depth_per_dissipation(body, speed) for body in BODIES)
         linear = None

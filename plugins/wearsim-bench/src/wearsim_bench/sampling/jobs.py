@@ -17,7 +17,7 @@ from wearsim.errors import SolverError
 from wearsim.scenario import Scenario
 from wearsim.scenario.examples import shipped_scenario
 from wearsim.studies.ensemble.api import ensemble
-from wearsim.studies.ensemble.batch import MAX_BATCH
+from wearsim.studies.ensemble.batch_sizes import MOST_IN_BATCH
 from wearsim.studies.ensemble.designs import EnsemblePlan
 from wearsim.studies.ensemble.realisation import (
     DRAWS,
@@ -169,8 +169,8 @@ Job: TypeAlias = Part | ControlDraws | Timing
 
 def parts(plan: PlanName, seed: int, total: int) -> list[Part]:
     """Return the parts of a study, each of the largest batch size."""
-    firsts = range(0, total, MAX_BATCH)
-    return [Part(plan, seed, total, k, min(MAX_BATCH, total - k)) for k in firsts]
+    firsts = range(0, total, MOST_IN_BATCH)
+    return [Part(plan, seed, total, k, min(MOST_IN_BATCH, total - k)) for k in firsts]
 
 
 class Jobs:
