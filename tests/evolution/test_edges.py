@@ -132,6 +132,31 @@ def test_separate_rollers_wear_like_identical_ones() -> None:
     assert three.depth[-1] == pytest.approx(one.depth[-1], rel=1e-3)
 
 
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3])
+@pytest.mark.parametrize("offsets", [["-1 mm", "0.3 mm", "1 mm"], ["0 mm", "0.9 mm", "0 mm"]])
+def test_both_bodies_of_every_strip_wear_in_a_constant_ratio(
+    offsets: list[str], tolerance: float
+) -> None:
+    result = run(
+        {
+            **PLAIN,
+            "evolution.tolerance": tolerance,
+            "wear.roller.k_over_h": "5e-12 1/Pa",
+            "roller.offset": offsets,
+        }
+    )
+    records = result.raw.records
+    cylinder, rollers = (
+        records[f"{body}_depth_profile"][-1].reshape(-1, len(result.y))
+        for body in ("cylinder", "roller")
+    )
+    by_rollers = result.raw.static["multiplicity"] @ rollers
+    ratio = cylinder.sum() / by_rollers.sum()
+    # what the volume of a body lacks is spread over its strips
+    wanted, allowed = ratio * by_rollers, 0.3 * tolerance * cylinder.max()
+    np.testing.assert_allclose(cylinder[0], wanted, atol=allowed)
+
+
 def test_strips_that_reach_the_ends_of_a_roller_wear_in_the_groove_only() -> None:
     wide = {**PLAIN, "friction.coefficient": 0.12}
     ended, endless = run({**wide, "roller.width": "20 mm"}), run(wide)

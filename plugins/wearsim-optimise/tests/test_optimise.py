@@ -74,7 +74,7 @@ def test_active_limit_is_where_root_finding_has_it(folder):
 def test_sqrt_law_of_the_crown_radius_gives_the_closed_form():
     scenario = shipped_scenario("rig-450min", ALONE)
     options: dict[str, Any] = {"maximise": "life.b10", "realisations": 1, "starts": 1}
-    options |= {"subject_to": ["life.width < 14 mm"], "evaluations": 6, "confirm": False}
+    options |= {"subject_to": ["life.width < 14 mm"], "evaluations": 10, "confirm": False}
     found = optimise(scenario, ["roller.crown_radius=300mm:900mm"], scheduler="serial", **options)
     closed = 14e-3**2 / (8.0 * (50e-6 - scenario.outputs.width_threshold))
     # the bodies are elastic

@@ -15,7 +15,6 @@ from wearsim.mechanics.numerics.edge_strips import (
     LEAST,
     NONE,
     SETTLED,
-    YOUNG_STEPS,
     EdgeStrips,
     by_others,
     compare_edges,
@@ -24,10 +23,17 @@ from wearsim.mechanics.numerics.edge_strips import (
     fill_resolved,
     fill_separations,
     linearise_edges,
-    mark_strips,
     part_at,
     start_edges,
     sum_of_wear,
+)
+from wearsim.mechanics.numerics.young_strips import (
+    FIRST_STEPS,
+    OLD,
+    PARTIAL,
+    WHOLE,
+    YOUNG_STEPS,
+    mark_strips,
 )
 
 TESTS, STRIPS, ROLLERS = 3, 12, 2
@@ -95,8 +101,13 @@ class Edges:
             if rest > 1e-9 * SIZE:
                 share = self.share(b, k, i)
                 ahead, joint = ahead + share * rest, joint + (1.0 - share) * rest
-                in_step = self.strips.added[b, k % TESTS, i] + total[b]
-                grown += share * rest / total[b] * in_step
+                added, own = self.strips.added[b, k % TESTS, i], self.wear[:, k, i]
+                if own[1 - side] > 0.0:  # both bodies of this contact grow in the ratio of its wear
+                    other = self.bodies[k // TESTS][1 - side]
+                    by_this = self.strips.added[other, k % TESTS, i] * own[side] / own[1 - side]
+                    grown += share * (rest + max(added - by_this, 0.0))
+                else:
+                    grown += share * rest / total[b] * (added + total[b])
         return ahead, grown, joint
 
     def part_of(self, k: int, i: int, level: float) -> float:
@@ -244,7 +255,7 @@ def test_difference_to_the_formula_is_the_greatest_of_all_strips(edges: Edges, p
 
 @pytest.mark.parametrize("counted", [True, False])
 def test_depths_grow_by_the_crossed_parts(edges: Edges, counted: bool) -> None:
-    worn = SIZE * np.random.default_rng(3).random(edges.shape)
+    worn = edges.sums(edges.wear)
     depths, parts = np.empty(edges.shape), np.empty(edges.shape)
     fields = np.empty((3, CONTACTS, STRIPS))
     arguments = edges.whole_steps, edges.level, edges.loads, edges.wear, worn
@@ -260,14 +271,21 @@ def test_depths_grow_by_the_crossed_parts(edges: Edges, counted: bool) -> None:
             added = edges.level[k, i] - edges.of(edges.strips.rows, k, i) - grown
         elif loaded:
             added = 0.5 * edges.strips.rise[k, i] * (part**2 - edges.part[k, i] ** 2)
-        for side, b in enumerate(edges.bodies[k // TESTS]):
-            crossed[b, v, i] |= edges.whole_steps[k, i] < SETTLED
-            if own > 0.0:
-                growth[b, v, i] += max(added, 0.0) / (own + joint) * edges.wear[side, k, i]
+        shared, of_one = edges.bodies[k // TESTS]
+        crosses = edges.whole_steps[k, i] < SETTLED
+        crossed[shared, v, i] |= crosses
+        ratio = max(added, 0.0) / (own + joint) if own > 0.0 else 0.0
+        of_shared, of_roller = edges.wear[:, k, i]
+        formula = edges.strips.base[of_one, v, i] + of_roller - growth[of_one, v, i]
+        by_roller = ratio * of_roller if crosses else formula
+        growth[of_one, v, i] += by_roller
+        growth[shared, v, i] += by_roller * of_shared / of_roller if of_roller > 0.0 else 0.0
+        for b in (shared, of_one):
             greatest[b, v, i] = max(greatest[b, v, i], part)
         assert fields[1, k, i] == pytest.approx(part, abs=1e-9)
         steps = min(edges.whole_steps[k, i] + 1.0, SETTLED)
         assert fields[2, k, i] == (steps if part == 1.0 else 0.0)
+    crossed[1:] = True  # the wear of a roller is that by its only contact
     expected = np.where(crossed, growth, edges.strips.base + worn)
     np.testing.assert_allclose(depths[:, :2], expected[:, :2], rtol=1e-9)
     for k, _, i in edges.each():
@@ -291,26 +309,34 @@ def test_depths_grow_by_the_crossed_parts(edges: Edges, counted: bool) -> None:
 @pytest.mark.parametrize("wears", [True, False])
 def test_strips_are_young_for_steps_of_twice_the_order(bodies: np.ndarray, wears: bool) -> None:
     edges, orders = Edges(bodies), np.array([1, 2, 1])
+    shared = 2 if bodies is STATIONS else 0
     wear = np.where(np.arange(STRIPS) % 3 > 0, np.ones(edges.shape), 0.0)
-    wear[2 if bodies is STATIONS else 1 :] *= wears
-    young, crossed = np.empty(edges.shape, bool), np.empty(edges.shape, bool)
+    wear[shared] *= wears
+    young, crossed = np.empty(edges.shape, int), np.empty(edges.shape, bool)
     parts = np.empty(edges.shape)
     steps = edges.whole_steps
     arguments = bodies, edges.resolved, edges.part, steps, orders, wear
     mark_strips(*arguments, young, crossed, parts)
-    along_cam = bodies is STATIONS and wears
+
+    def youngest(contacts: list[int], v: int, i: int) -> int:
+        few = [k for k in contacts if steps[k, i] < YOUNG_STEPS * orders[v]]
+        partial = any(steps[k, i] < FIRST_STEPS for k in few)
+        return (PARTIAL if partial else WHOLE) if few else OLD
+
     for b in range(3):
         for v in range(2):
             for i in range(STRIPS):
-                touching = [c * TESTS + v for c, pair in enumerate(bodies) if b in pair]
-                meets = [k for k in touching if edges.part[k, i] > 0.0]
-                greatest = max([edges.part[k, i] for k in meets], default=0.0)
-                few = YOUNG_STEPS * orders[v]
-                is_young = not meets or any(steps[k, i] < few for k in meets)
-                assert young[b, v, i] == (is_young and not along_cam)
+                contacts = [c * TESTS + v for c in range(len(bodies))]
+                loaded = [k for k in contacts if edges.part[k, i] > 0.0]
+                meets = [k for k in loaded if b in bodies[k // TESTS]]
+                together = b == shared or wear[shared, v, i] > 0.0
+                expected = youngest(loaded if together else meets, v, i) if meets else PARTIAL
+                assert young[b, v, i] == expected
                 assert crossed[b, v, i] == any(steps[k, i] < SETTLED for k in meets)
+                greatest = max([edges.part[k, i] for k in meets], default=0.0)
                 assert parts[b, v, i] == (greatest if wear[b, v, i] > 0.0 else 0.0)
-    assert not young[:, 2].any()
+    assert {OLD, WHOLE, PARTIAL} == set(young[:, :2].ravel().tolist())
+    assert (young[:, 2] == OLD).all()
     assert not crossed[:, 2].any()
     assert (parts[:, 2] == 1.0).all()
 

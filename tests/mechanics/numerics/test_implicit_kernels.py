@@ -20,7 +20,7 @@ from wearsim.mechanics.numerics.edge_strips import (
     fill_resolved,
     fill_separations,
     linearise_edges,
-    mark_strips,
+    own_side,
     start_edges,
 )
 from wearsim.mechanics.numerics.implicit_step import (
@@ -33,6 +33,7 @@ from wearsim.mechanics.numerics.implicit_step import (
 )
 from wearsim.mechanics.numerics.linearised_wear import linearised_wear, wear_of_bodies
 from wearsim.mechanics.numerics.multistep import ROWS, formulas, new_differences
+from wearsim.mechanics.numerics.young_strips import AT_START, OLD, WHOLE, mark_strips
 
 TESTS, STRIPS, SIZE = 3, 5, 1e-6
 ROLLERS, STATIONS = np.array([[0, 1], [0, 2]]), np.array([[0, 2], [1, 2]])
@@ -105,6 +106,11 @@ class Step:
             [values[self.bodies[:, side]].reshape(CONTACTS, STRIPS) for side in range(2)]
         )
 
+    def of_own(self, values: np.ndarray) -> np.ndarray:
+        """Return values of the body that each contact shares with no other one."""
+        own = self.bodies[:, own_side(self.bodies)]
+        return np.asarray(values[own].reshape(CONTACTS, STRIPS))
+
 
 @pytest.fixture(params=["resolved", "cam", "counted", "none"])
 def step(request: pytest.FixtureRequest) -> Step:
@@ -125,16 +131,19 @@ def test_step_begins_with_its_formula(step: Step) -> None:
     fill_resolved(step.separation, step.part, resolved)
     followed = step.edges in {"resolved", "cam"}
     assert step.resolved.tolist() == resolved.tolist() == [followed, followed, False]
-    young, crossed, parts = np.empty(SHAPE, bool), np.empty(SHAPE, bool), np.empty(SHAPE)
+    young, crossed, parts = np.empty(SHAPE, int), np.empty(SHAPE, bool), np.empty(SHAPE)
     state = step.part, step.whole_steps, step.orders, step.past_wear[0]
     mark_strips(step.bodies, resolved | step.in_groove, *state, young, crossed, parts)
-    assert young.any() == (step.edges != "none")
-    first_order = (lengths / step.exposure - half) / worn_passes
-    scale = np.where(young, first_order[:, None], 1.0)
+    assert (young != OLD).any() == (step.edges != "none")
+    length = lengths / step.exposure
+    weighted = (young == WHOLE) & resolved[:, None]
+    before = np.where(weighted, AT_START * length[:, None], 0.0)
+    before = np.maximum(before, half[:, None])
+    scale = np.where(young != OLD, (length[:, None] - before) / worn_passes[:, None], 1.0)
     apart = np.empty(SHAPE)
     fill_separations(step.bodies, resolved, step.separation, step.share, apart)
     added, guess = np.einsum("wkv,krvi->wrvi", weights, step.past_wear)
-    added = np.where(young, half[:, None] * step.past_wear[0], added)
+    added = np.where(young != OLD, before * step.past_wear[0], added)
     level = step.depths - apart
     expected = [scale, level, added, level + added, level + guess]
     np.testing.assert_allclose(step.of_bodies[:5], expected, rtol=1e-12, atol=1e-20)
@@ -145,7 +154,7 @@ def test_step_begins_with_its_formula(step: Step) -> None:
     np.testing.assert_allclose(step.feedback, feedback, rtol=1e-12)
     both = step.by_contact(level + guess).sum(axis=0)
     np.testing.assert_allclose(step.of_contacts[2], both, rtol=1e-12)
-    passes = step.by_contact(scale * worn_passes[:, None])
+    passes = step.of_own(scale * worn_passes[:, None])
     np.testing.assert_allclose(step.wear, wear * passes, rtol=1e-12)
     strips = step.copied()
     strips.first[:], strips.rise[:], strips.greatest[:] = np.nan, np.nan, np.nan
@@ -179,7 +188,7 @@ def test_solution_is_compared_with_the_linearised_wear_and_the_edges(step: Step)
     loads, apart = step.loads * (0.8 + 0.4 * rng.random((CONTACTS, STRIPS))), SIZE * rng.random()
     wear, worn = SIZE * rng.random(step.wear.shape) * (loads > 0.0), np.full(SHAPE, 7.0)
     apart = np.full((CONTACTS, STRIPS), -200.0 * apart)  # far from the formula
-    passes = step.by_contact(step.of_bodies[0] * step.of_tests[0][:, None])
+    passes = step.of_own(step.of_bodies[0] * step.of_tests[0][:, None])
     by_formula, exponents, known = wear * passes, step.exponents.copy(), worn.copy()
     linear, strips, level = np.empty_like(loads), step.copied(), step.of_contacts[2].copy()
     of_bodies = wear_of_bodies(
@@ -238,7 +247,10 @@ def test_step_ends_with_the_sums_of_its_formula(step: Step, broken: str) -> None
         *(worn, step.of_tests, step.sums, feedback, powers.ravel(), weights, step.past_wear),
         *(step.past_sums, step.past_feedback, energy, found, fields, *new, decreased),
     )
-    rates = worn / worn_passes[:, None] / step.of_bodies[0]
+    rates, by_contact = np.zeros(SHAPE), step.wear / step.of_own(step.of_bodies[0])
+    for c, pair in enumerate(step.bodies):
+        for side, b in enumerate(pair):
+            rates[b] += by_contact[side].reshape(-1, TESTS, STRIPS)[c] / worn_passes[:, None]
     sum_rates = np.concatenate([rates.sum(axis=2), per_pass[None]])[..., None]
     sums += worn_passes[:, None] * sum_rates
     np.testing.assert_allclose(step.sums, sums, rtol=1e-12)

@@ -10,7 +10,6 @@ import math
 import numpy as np
 import pytest
 
-from wearsim.mechanics.numerics.edge_strips import mark_strips
 from wearsim.mechanics.numerics.implicit_step import WHOLE_PASSES
 from wearsim.mechanics.numerics.linearised_wear import carried_errors
 from wearsim.mechanics.numerics.multistep import MAX_ORDER, ROWS, next_steps
@@ -30,6 +29,7 @@ from wearsim.mechanics.numerics.step_errors import (
     assess_step,
     with_sum,
 )
+from wearsim.mechanics.numerics.young_strips import AT_START, OLD, WHOLE, mark_strips
 
 TESTS, STRIPS, SIZE = 2, 7, 1e-6
 
@@ -136,17 +136,17 @@ def test_estimates_cover_errors_of_steps_edges_and_sums(
     shape = step.shape
     step.sums[2:, -1] *= of_energy / SIZE
     step.spans[points - 1 :] = np.inf  # missing past points
-    young, crossed = np.empty(shape, bool), np.empty(shape, bool)
+    formulas, crossed = np.empty(shape, int), np.empty(shape, bool)
     parts, own, orders = np.empty(shape), np.empty(shape), np.empty(TESTS, np.int64)
     state = step.part, step.whole_steps, step.orders, step.past[0]
-    mark_strips(step.bodies, step.resolved, *state, young, crossed, parts)
-    # the wear of a roller that meets several stations is of one order in all strips
-    assert young[:, 0].any() == (stations == 1)
+    mark_strips(step.bodies, step.resolved, *state, formulas, crossed, parts)
+    young = formulas != OLD
+    assert young[:, 0].any()
     assert crossed[:, 0].any()
     parts[young] *= YOUNG
     most = np.array([EDGE_ORDER, MAX_ORDER])
     scale = step.done ** np.array([EDGES_EXPONENT, PART_EXPONENT]) / step.left
-    scale[0] /= BESIDE_YOUNG if stations == 1 else 1.0
+    scale[0] /= BESIDE_YOUNG
     arguments = scale, SHARE * 1e-3, KEEP, most, parts, own, orders
     expected = next_steps(step.past, step.spans, step.depths, step.orders, *arguments)
     expected[0] *= step.left
@@ -182,11 +182,11 @@ def test_estimates_cover_errors_of_steps_edges_and_sums(
             spans = step.spans[:2, v]
             first_order = spans[0] / (1.0 / spans).sum() * step.past[2, :, v] * (points > 2)
             at_edge = np.where(crossed[:, v], own[:, v], 0.0)
+            first_order *= np.where(formulas[:, v] == WHOLE, 1.0 - 2.0 * AT_START, 1.0)
             at_edge += np.where(young[:, v] & (step.past[0, :, v] > 0.0), first_order, 0.0)
             edges = EDGES * np.linalg.norm(at_edge) / np.linalg.norm(step.depths[:, v])
             profile = math.hypot(profile, edges)
-            cover = OF_YOUNG if stations == 1 else 1.0
-            depth, volume = cover * depth, cover * volume
+            depth, volume = OF_YOUNG * depth, OF_YOUNG * volume
         least = step.irreducible[:, v]
         volume = COVER[1] * volume + step.volume_error[v]
         relative = volume / (step.weights[1] @ step.depths[:, v].sum(axis=1))

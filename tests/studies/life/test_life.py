@@ -217,7 +217,8 @@ def test_first_of_two_limits_ends_each_life(exact: LifeResult, tmp_path: Path) -
     shares = both.first_limits
     assert sum(shares.values()) == pytest.approx(1.0)
     assert 0.0 < shares["volume"] < 1.0
-    assert (both.lives <= exact.lives * (1.0 + 1e-5)).all()
+    # steps end at the first limit, so that lives differ by errors of steps
+    assert (both.lives <= exact.lives * (1.0 + 2e-4)).all()
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,11 @@ formula l = l_0 + w then solves f(l) (l - l_0) = f w, where f w is the mean wear
 iteration begins at the extrapolated l; a strip that is loaded although the edge does not reach it
 there continues from f = 1/2.
 
+Strips that the edge has just crossed take steps of first order, see
+`mechanics.numerics.young_strips`. Every contact wears its two bodies in a constant ratio. A body
+that several contacts wear, as a cylinder under different rollers or the roller of a cam, therefore
+wears by the sum of the depths of the other bodies, each times the ratio of its contact.
+
 Where edges are not resolved, as under loads that vary, strips are in contact or not as wholes. Past
 points of the depth of a strip that has just come into contact lie before the corner, so that it
 takes steps of first order there too.

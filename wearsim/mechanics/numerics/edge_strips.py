@@ -16,7 +16,6 @@ from wearsim.mechanics.numerics.multistep import ROWS
 from wearsim.types import BoolArray, FloatArray, IntArray
 
 SETTLED = float(ROWS)  # steps after which all points of a formula lie in contact
-YOUNG_STEPS = 2.0  # steps for which a strip is young, over the order
 ELASTIC = 0.5
 LEAST, FULL, NONE = 0.1, 0.5, 1.0
 FLAT = 1e-15  # least rise of a gap across a strip [m]
@@ -153,13 +152,27 @@ def share_ahead(strips: EdgeStrips, part: float, b: int, v: int, i: int) -> floa
 
 
 @subroutine
+def own_side(bodies: IntArray) -> int:
+    """Return the side of the body that a contact shares with no other one: the roller's or a cam's.
+
+    Parameters
+    ----------
+    bodies : ndarray of int, shape (contacts each, 2)
+        As in `EdgeStrips`, of rollers that pass one station, or of one that passes several.
+    """
+    return 1 if bodies[len(bodies) - 1, 0] == 0 else 0
+
+
+@subroutine
 def by_others(
     strips: EdgeStrips, wear: FloatArray, sums: FloatArray, k: int, i: int
 ) -> tuple[float, float, float]:
     """Return the wear of a strip by the other contacts of its bodies.
 
     Where another contact reaches further across the strip, its wear lowers the part ahead of the
-    edge too; the other wear is joint, on the part that this contact has crossed.
+    edge too; the other wear is joint, on the part that this contact has crossed. What others have
+    added to a body is all that is added to it, less what this contact adds to both of its bodies in
+    the ratio of their wear.
 
     Returns
     -------
@@ -167,17 +180,19 @@ def by_others(
         Wear at the end of the step that lowers the whole strip, the same in the whole step, and
         joint wear [m].
     """
-    ahead, grown, joint, realisations = 0.0, 0.0, 0.0, sums.shape[1]
-    part = strips.part[k, i]
-    for side in range(2):
-        b, v = strips.bodies[k // realisations, side], k % realisations
-        of_others = sums[b, v, i] - wear[side, k, i]
-        if of_others > 0.0:
-            share = share_ahead(strips, part, b, v, i)
-            ahead += share * of_others
-            joint += (1.0 - share) * of_others
-            grown += share * of_others / sums[b, v, i] * (strips.added[b, v, i] + sums[b, v, i])
-    return ahead, grown, joint
+    c, realisations = k // strips.resolved.size, strips.resolved.size
+    side, v = own_side(strips.bodies), k % realisations
+    own, b = strips.bodies[c, side], strips.bodies[c, 1 - side]
+    of_this, of_own = wear[1 - side, k, i], wear[side, k, i]
+    of_others = sums[b, v, i] - of_this
+    if not of_others > 0.0:
+        return 0.0, 0.0, 0.0
+    share = share_ahead(strips, strips.part[k, i], b, v, i)
+    if of_own > 0.0:
+        added = max(strips.added[b, v, i] - of_this / of_own * strips.added[own, v, i], 0.0)
+    else:
+        added = of_others / sums[b, v, i] * strips.added[b, v, i]
+    return share * of_others, share * (of_others + added), (1.0 - share) * of_others
 
 
 @subroutine
@@ -336,6 +351,7 @@ def end_edges(
     contacts, n = level.shape
     rows, realisations, _ = worn.shape
     sums, crossed = np.empty(worn.shape), np.empty(worn.shape, np.bool_)
+    side = own_side(strips.bodies)
     sum_of_wear(strips, strips.resolved, wear, sums)
     for b in range(rows):
         for v in range(realisations):
@@ -343,8 +359,8 @@ def end_edges(
                 depths[b, v, i], parts[b, v, i] = strips.rows[b, v, i], 0.0
                 crossed[b, v, i] = False
     for k in range(contacts):
-        one, other = strips.bodies[k // realisations, 0], strips.bodies[k // realisations, 1]
-        v = k % realisations
+        c, v = k // realisations, k % realisations
+        own, shared = strips.bodies[c, side], strips.bodies[c, 1 - side]
         for i in range(n):
             if not strips.resolved[v]:
                 for field in range(len(fields)):
@@ -352,26 +368,31 @@ def end_edges(
                 if counted:
                     fields[1, k, i] = 1.0 if loads[k, i] > 0.0 else 0.0
                     fields[2, k, i] = fields[1, k, i] * min(whole_steps[k, i] + 1.0, SETTLED)
-                    for b in (one, other):
+                    for b in (own, shared):
                         parts[b, v, i] = max(parts[b, v, i], fields[1, k, i])
                 continue
             _, grown, joint = by_others(strips, wear, sums, k, i)
             before, part, growth = strips.part[k, i], 0.0, 0.0
             if loads[k, i] > 0.0:
                 part = part_at(strips, k, i, level[k, i], grown)
-                depth = strips.rows[one, v, i] + strips.rows[other, v, i]
+                depth = strips.rows[own, v, i] + strips.rows[shared, v, i]
                 growth = level[k, i] - depth - grown
                 if part < 1.0:
                     growth = 0.5 * strips.rise[k, i] * (part * part - before * before)
-            own = wear[0, k, i] + wear[1, k, i]
-            ratio = max(growth, 0.0) / (own + joint) if own > 0.0 else 0.0
-            for side in range(2):
-                b = strips.bodies[k // realisations, side]
-                # a strip of a body follows the formula where all of its contacts do
-                crossed[b, v, i] |= whole_steps[k, i] < SETTLED
-                depths[b, v, i] += ratio * wear[side, k, i]
-                parts[b, v, i] = max(parts[b, v, i], part)
+            of_both = wear[0, k, i] + wear[1, k, i]
+            ratio = max(growth, 0.0) / (of_both + joint) if of_both > 0.0 else 0.0
+            of_own, of_shared = wear[side, k, i], wear[1 - side, k, i]
             steps = min(whole_steps[k, i] + 1.0, SETTLED)
+            if whole_steps[k, i] >= SETTLED:
+                depths[own, v, i] = strips.base[own, v, i] + of_own
+            else:
+                depths[own, v, i] += ratio * of_own
+                crossed[own, v, i], crossed[shared, v, i] = True, True
+            if of_own > 0.0:  # each contact wears both of its bodies in one ratio
+                ratio = (depths[own, v, i] - strips.rows[own, v, i]) / of_own
+            depths[shared, v, i] += ratio * of_shared
+            for b in (own, shared):
+                parts[b, v, i] = max(parts[b, v, i], part)
             fields[1, k, i], fields[2, k, i] = part, steps if part >= 1.0 else 0.0
     for b in range(rows):
         for v in range(realisations):
@@ -387,66 +408,6 @@ def end_edges(
             if part > 0.0:
                 apart = 0.5 * strips.rise[k, i] * ((1.0 - part) * (1.0 - part))
             fields[0, k, i] = apart
-
-
-@subroutine
-def mark_strips(
-    bodies: IntArray,
-    resolved: BoolArray,
-    part: FloatArray,
-    whole_steps: FloatArray,
-    orders: IntArray,
-    wear: FloatArray,
-    young: BoolArray,
-    crossed: BoolArray,
-    parts: FloatArray,
-) -> None:
-    """Fill which strips of the bodies are young, which an edge has crossed, and their parts.
-
-    Young strips take steps of first order. Points of formulas of the state's order would lie ahead
-    of the edge or close to it, until as many steps again have been taken. There the surfaces close
-    as the power 3/2 of the distance from it, and higher orders would overshoot. A worn roller of a
-    cam meets the edges at all stations at different times. Its wear by one of them has no past
-    points, and both bodies of a contact must wear by the same formula: no strip is young then.
-
-    Parameters
-    ----------
-    bodies, resolved
-        As in `EdgeStrips`.
-    part, whole_steps : ndarray, shape (contacts, strips)
-        As in `WearState`.
-    orders : ndarray of int, shape (realisations,)
-        Orders of the steps.
-    wear : ndarray, shape (bodies, realisations, strips)
-        Wear per roller pass [m].
-    young, crossed : ndarray of bool, shape as `wear`
-        Results: strips that are young, and that an edge is crossing or has crossed lately.
-    parts : ndarray, shape as `wear`
-        Result: greatest part in contact, 0 without wear; 1 in tests that do not resolve edges.
-    """
-    rows, realisations, n = wear.shape
-    stations = bodies[len(bodies) - 1, 0] + 1
-    for v in range(realisations):
-        takes_part, young_steps = resolved[v], YOUNG_STEPS * orders[v]
-        for b in range(rows):
-            for i in range(n):
-                if stations > 1 and b >= stations and wear[b, v, i] > 0.0:
-                    takes_part = False
-                young[b, v, i], crossed[b, v, i] = False, False
-                parts[b, v, i] = 0.0 if resolved[v] else 1.0
-        for c in range(len(bodies) if resolved[v] else 0):
-            k = c * realisations + v
-            for side in range(2):
-                b = bodies[c, side]
-                for i in range(n):
-                    if part[k, i] > 0.0:
-                        parts[b, v, i] = max(parts[b, v, i], part[k, i])
-                        young[b, v, i] = young[b, v, i] or whole_steps[k, i] < young_steps
-                        crossed[b, v, i] = crossed[b, v, i] or whole_steps[k, i] < SETTLED
-        for b in range(rows if resolved[v] else 0):
-            for i in range(n):
-                young[b, v, i] = takes_part and (young[b, v, i] or not parts[b, v, i] > 0.0)
-                parts[b, v, i] = parts[b, v, i] if wear[b, v, i] > 0.0 else 0.0
 
 
 @subroutine

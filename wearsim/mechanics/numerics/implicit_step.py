@@ -17,12 +17,13 @@ from wearsim.mechanics.numerics.edge_strips import (
     fill_resolved,
     fill_separations,
     linearise_edges,
-    mark_strips,
+    own_side,
     start_edges,
 )
 from wearsim.mechanics.numerics.jit import borrowed, kernel
 from wearsim.mechanics.numerics.linearised_wear import linearised_wear, wear_of_bodies
 from wearsim.mechanics.numerics.multistep import ROWS, extrapolated, formulas, new_differences
+from wearsim.mechanics.numerics.young_strips import AT_START, OLD, WHOLE, mark_strips
 from wearsim.types import BoolArray, FloatArray, IntArray
 
 WHOLE_PASSES = 2.0  # steps above which passes are counted one by one
@@ -87,9 +88,10 @@ def begin_step(
     sums, feedback : ndarray, shape (rows, realisations, 1)
         Results: increase of the sums without the wear at the end, and predicted feedback [N].
     of_bodies : ndarray, shape (6, bodies, realisations, strips)
-        Results: what the passes of the wear are multiplied by in strips that follow the formula of
-        first order; depths less separations at the start, their increase without the wear at the
-        end, the sum of both, and predicted depths [m]; `greatest` of `EdgeStrips`.
+        Results: what the passes of the wear are multiplied by in young strips, which both bodies of
+        a contact take from the one that is its own; depths less separations at the start, their
+        increase without the wear at the end, the sum of both, and predicted depths [m]; `greatest`
+        of `EdgeStrips`.
     of_contacts : ndarray, shape (3, contacts, strips)
         Results: `first` and `rise` of `EdgeStrips`, and the predicted depth of both bodies [m].
     """
@@ -110,19 +112,21 @@ def begin_step(
     for v in range(realisations):
         marked[v] = resolved[v] or in_groove[v]
     shape = depths.shape
-    young, crossed = np.empty(shape, np.bool_), np.empty(shape, np.bool_)
+    young, crossed = np.empty(shape, np.int64), np.empty(shape, np.bool_)
     mark_strips(bodies, marked, part, whole_steps, orders, past_wear[0], young, crossed, scale)
     fill_separations(bodies, resolved, separation, share, level)
     extrapolated(weights[0], past_wear, added)
     extrapolated(weights[1], past_wear, guess)
     for b in range(rows):
         for v in range(realisations):
-            first_order = (lengths[v] / exposure[v] - half_pass[v]) / worn_passes[v]
+            length = lengths[v] / exposure[v]
             for i in range(n):
                 scale[b, v, i] = 1.0
-                if young[b, v, i]:
-                    scale[b, v, i] = first_order
-                    added[b, v, i] = half_pass[v] * past_wear[0, b, v, i]
+                if young[b, v, i] != OLD:
+                    weighted = resolved[v] and young[b, v, i] == WHOLE
+                    before = max(AT_START * length if weighted else 0.0, half_pass[v])
+                    scale[b, v, i] = (length - before) / worn_passes[v]
+                    added[b, v, i] = before * past_wear[0, b, v, i]
                 level[b, v, i] = depths[b, v, i] - level[b, v, i]
                 base[b, v, i] = level[b, v, i] + added[b, v, i]
                 guess[b, v, i] += level[b, v, i]
@@ -134,12 +138,12 @@ def begin_step(
     strips = borrowed(edge_strips(bodies, resolved, gap, depths, part, of_bodies, of_contacts))
     start_edges(strips, separation, approach)
     for k in range(len(gap)):
-        v = k % realisations
-        one, other = bodies[k // realisations, 0], bodies[k // realisations, 1]
+        c, v = k // realisations, k % realisations
+        own = bodies[c, own_side(bodies)]
         for i in range(n):
-            contact_depth[k, i] = guess[one, v, i] + guess[other, v, i]
-            wear[0, k, i] *= worn_passes[v] * scale[one, v, i]
-            wear[1, k, i] *= worn_passes[v] * scale[other, v, i]
+            contact_depth[k, i] = guess[bodies[c, 0], v, i] + guess[bodies[c, 1], v, i]
+            wear[0, k, i] *= worn_passes[v] * scale[own, v, i]
+            wear[1, k, i] *= worn_passes[v] * scale[own, v, i]
 
 
 @kernel
@@ -237,10 +241,10 @@ def compare_step(
     slopes, linear = about[1], np.empty(gap.shape)
     for k in range(len(gap)):
         v = k % realisations
+        own = bodies[k // realisations, own_side(bodies)]
         for side in range(2):
-            b = bodies[k // realisations, side]
             for i in range(n):
-                new_wear[side, k, i] *= worn_passes[v] * scale[b, v, i]
+                new_wear[side, k, i] *= worn_passes[v] * scale[own, v, i]
     sizes = wear_of_bodies(
         loads,
         line_load,
@@ -338,12 +342,18 @@ def end_step(
     scale, level, added = of_bodies[0], of_bodies[1], of_bodies[2]
     counted = part.shape[1] > separation.shape[1]
     end_edges(strips, counted, whole_steps, of_contacts[2], loads, wear, worn, ends, parts, fields)
-    sum_rates = np.empty(sums.shape)
+    sum_rates, rates[:] = np.empty(sums.shape), 0.0
+    for k in range(len(gap)):
+        c, v = k // realisations, k % realisations
+        own = bodies[c, own_side(bodies)]
+        for side in range(2):
+            for i in range(n):
+                of_contact = wear[side, k, i] / worn_passes[v] / scale[own, v, i]
+                rates[bodies[c, side], v, i] += of_contact
     for b in range(rows):
         for v in range(realisations):
             total, grown, width = 0.0, 0.0, 0.0
             for i in range(n):
-                rates[b, v, i] = worn[b, v, i] / worn_passes[v] / scale[b, v, i]
                 total += rates[b, v, i]
                 grown += ends[b, v, i] - depths[b, v, i]
                 width += parts[b, v, i]

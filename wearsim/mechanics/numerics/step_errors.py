@@ -9,11 +9,12 @@ import math
 
 import numpy as np
 
-from wearsim.mechanics.numerics.edge_strips import fill_resolved, mark_strips
+from wearsim.mechanics.numerics.edge_strips import fill_resolved
 from wearsim.mechanics.numerics.implicit_step import WHOLE_PASSES, compile_implicit_step
 from wearsim.mechanics.numerics.jit import compile_alongside, kernel, subroutine
 from wearsim.mechanics.numerics.linearised_wear import carried_errors
 from wearsim.mechanics.numerics.multistep import MAX_ORDER, ROWS, next_steps
+from wearsim.mechanics.numerics.young_strips import AT_START, OLD, WHOLE, mark_strips
 from wearsim.types import BoolArray, FloatArray, IntArray
 
 SHARE = 0.35  # part of the tolerance that a step may add to the profiles
@@ -28,14 +29,14 @@ OF_VOLUME = (0.33, 0.5)
 # less smooth after a change of order; where inputs vary they are not smooth at any order
 KEEP = 0.9
 # safety factor on local errors of strips that the edge crosses
-EDGES = 8.0
+EDGES = 6.0
 # greatest order where edges are resolved within a strip: beyond the first derivative the wear of
 # strips that the edge has just crossed is not smooth, and pressures would overshoot
 EDGE_ORDER = 3
 # part of the difference in young strips that counts as error of a step: they are not smooth enough
 # for an estimate, which is too great; safety factor on errors of depth and volume then, and part of
 # the usual error that a step aims at, as the pressure at the edges follows from these strips
-YOUNG, OF_YOUNG, BESIDE_YOUNG = 0.2, 9.0, 1.0 / 3.0
+YOUNG, OF_YOUNG, BESIDE_YOUNG = 0.2, 9.0, 0.36
 # lower bounds: the depth grows with a power of 2/3 to 1 of the passes, the volume with about 1
 DEPTH_EXPONENT, VOLUME_EXPONENT = 0.5, 0.75
 # the error that a step aims at falls where the errors so far, over the tolerance, exceed the first
@@ -218,7 +219,7 @@ def assess_step(
     most, orders_by_energy = np.empty(realisations, np.int64), np.empty(realisations, np.int64)
     resolved = np.empty(realisations, np.bool_)
     fill_resolved(part, part, resolved)
-    young, crossed = np.empty(depths.shape, np.bool_), np.empty(depths.shape, np.bool_)
+    young, crossed = np.empty(depths.shape, np.int64), np.empty(depths.shape, np.bool_)
     parts, own = np.empty(depths.shape), np.empty(depths.shape)
     mark_strips(bodies, resolved, part, whole_steps, orders, past_wear[0], young, crossed, parts)
     scale, discounted = np.empty(realisations), np.empty(realisations, np.bool_)
@@ -226,7 +227,7 @@ def assess_step(
         discounted[v] = False
         for b in range(rows):
             for i in range(n):
-                if young[b, v, i]:
+                if young[b, v, i] != OLD:
                     parts[b, v, i] *= YOUNG
                     discounted[v] = True
         most[v] = EDGE_ORDER if resolved[v] else MAX_ORDER
@@ -301,8 +302,9 @@ def assess_step(
                 square += depth * depth
                 if resolved[v]:
                     at_edge = own[b, v, i] if crossed[b, v, i] else 0.0
-                    if young[b, v, i] and past_wear[0, b, v, i] > 0.0:
-                        at_edge += factor * past_wear[2, b, v, i]
+                    if young[b, v, i] != OLD and past_wear[0, b, v, i] > 0.0:
+                        weight = 1.0 - 2.0 * AT_START if young[b, v, i] == WHOLE else 1.0
+                        at_edge += weight * factor * past_wear[2, b, v, i]
                 of_edges += (EDGES * at_edge) * (EDGES * at_edge)
             volume += volume_weights[1, b] * total
         sizes[0, v] += displaced[v]

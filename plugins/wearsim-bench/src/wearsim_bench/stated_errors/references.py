@@ -156,6 +156,7 @@ def worn_at_end(
     *,
     until: float = np.inf,
     grows: bool = False,
+    keeps_edges: bool = False,
 ) -> tuple[str, WearProblem, WearState]:
     """Return method, problem and final state of a test on given strips.
 
@@ -173,6 +174,9 @@ def worn_at_end(
         Process time by which it must be done [s], see `time_limit`.
     grows : bool
         Whether the strips grow with the groove, from the given ones.
+    keeps_edges : bool
+        Whether steps are taken instead of single passes where they resolve the edges of contacts
+        within a strip, which single passes do not: that is a difference by strips.
 
     Raises
     ------
@@ -184,7 +188,11 @@ def worn_at_end(
     if np.isfinite(longest):
         pass_by_pass = PreparedTest(test.scenario(evolution__stepper=EVERY_PASS), grid)
         most_passes = EACH_PASS if is_compiled(pass_by_pass.problem) else FEW_PASSES[1]
-        if prepared.stop <= most_passes:
+        single = prepared.stop <= most_passes
+        if single and keeps_edges:
+            started = stepper.started(prepared.problem, fresh_state(prepared.problem))
+            single = started.separation is None
+        if single:
             prepared, stepper, method = pass_by_pass, pass_by_pass.stepper, EVERY_PASS
         elif isinstance(stepper, ImplicitStepper):
             # with the same treatment of strips at the edge of a contact
@@ -356,7 +364,9 @@ def on_strips(test: RandomTest, start: Grid, end: Grid, folder: Path | None) -> 
     def compute() -> dict[str, Any]:
         grows = not same_strips(start, end)
         steps = TRUE_TOLERANCE, LONGEST_STEP
-        _, problem, state = worn_at_end(test, start, *steps, until=time_limit(), grows=grows)
+        _, problem, state = worn_at_end(
+            test, start, *steps, until=time_limit(), grows=grows, keeps_edges=True
+        )
         return vars(worn_of(problem, state))
 
     return Worn(**kept(path, compute))
