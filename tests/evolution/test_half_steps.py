@@ -213,18 +213,22 @@ def test_steps_aim_at_less_where_errors_have_added_up(rig):
         volume_error=fixed[1] + OF_STEPS[0] * of_volume,
         profile_error=fixed[2] + OF_STEPS[1] * of_profile,
     )
-    found = ImplicitStepper(tolerance)._left(problem, worn, stop, OF_STEPS, worn.irreducible)
+
+    def left(problem, state, fixed):
+        found = np.empty(len(state.passes))
+        ImplicitStepper(tolerance)._left(problem, state, stop, OF_STEPS, fixed, found)
+        return found
+
+    found = left(problem, worn, worn.irreducible)
     np.testing.assert_allclose(found, [0.5, LEAST_AIM, 0.5, 0.5, 1.0], rtol=1e-9)
     # where edges are resolved, the error of the profile decays
     cut = edges.without_edges(problem, worn)
     cut = cut.replaced(**dict.fromkeys(edges.FIELDS, np.zeros_like(worn.cylinder_depth)))
-    found = ImplicitStepper(tolerance)._left(problem, cut, stop, OF_STEPS, worn.irreducible)
+    found = left(problem, cut, worn.irreducible)
     np.testing.assert_allclose(found, [0.5, 1.0, 0.5, 1.0, 1.0], rtol=1e-9)
     young = worn.replaced(profile_error=np.full(5, 0.49 * low * tolerance))
-    assert (ImplicitStepper(tolerance)._left(problem, young, stop, OF_STEPS, fixed) == 1.0).all()
+    assert (left(problem, young, fixed) == 1.0).all()
     errors = {"profile_error": np.array([0.45 * tolerance]), "volume_error": of_volume[:1]}
     both = worn.at(np.array([0])).replaced(quadrature=0.0 * fixed[:, :1], **errors)
-    found = ImplicitStepper(tolerance)._left(
-        problem.at(np.array([0])), both, stop, OF_STEPS, both.irreducible
-    )
+    found = left(problem.at(np.array([0])), both, both.irreducible)
     np.testing.assert_allclose(found, 0.5, rtol=1e-9)

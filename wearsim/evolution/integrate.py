@@ -224,7 +224,10 @@ class Evolution:
     def _try_steps(self) -> Advance | None:
         """Try one step of every test in progress; return the accepted ones, if any."""
         self._grow()
-        self._relocate()
+        if not self._trials:  # else the state is that before a rejected step
+            problem, self.state = relocated(self.problem, self.state)
+            if problem is not self.problem:  # stations at skids that wear has moved
+                self.problem, self.state = problem, self.stepper.started(problem, self.state)
         lengths = self._lengths()
         if not self.numbers.size:
             return None
@@ -266,15 +269,6 @@ class Evolution:
         else:
             self._end_finished()
         return advance
-
-    def _relocate(self) -> None:
-        """Place the stations of a cam again if wear has moved its skids; the stepper restarts."""
-        if self._trials:
-            return  # the state is that before a rejected step
-        problem, state = relocated(self.problem, self.state)
-        restarted = problem is not self.problem
-        self.problem = problem
-        self.state = self.stepper.started(problem, state) if restarted else state
 
     def _lengths(self) -> FloatArray:
         """Return the length of each test's next trial step [passes]; end tests without one."""
@@ -361,12 +355,9 @@ class Evolution:
 def _finite(tried: Attempt) -> Attempt:
     """Return a step; raise StepError if it leads to a value that is not finite."""
     end = tried.path[-1]
-    for values in (end.cylinder_depth, end.energy):
-        # reduced, since all() takes twice as long on short arrays
-        if not np.logical_and.reduce(np.isfinite(values), axis=None):
-            raise StepError(
-                f"a value is not finite after pass {end.passes[0]:.0f}", end.to_arrays()
-            )
+    # a sum is not finite if one of its terms is not
+    if not np.isfinite(np.add.reduce(end.cylinder_depth + end.energy[:, None], axis=None)):
+        raise StepError(f"a value is not finite after pass {end.passes[0]:.0f}", end.to_arrays())
     return tried
 
 

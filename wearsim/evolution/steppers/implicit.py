@@ -120,13 +120,13 @@ class ImplicitStepper(StepDoublingStepper):
             end = end.with_added(*bias[:2])
         passes = np.where(step == stop - state.passes, stop, end.passes)
         fixed = state.irreducible
-        left = self._left(problem, state, stop, OF_STEPS, fixed)
+        work, order = np.zeros((7, step.size)), np.empty(step.size, np.int64)
+        of_next, estimates, displaced, left = work[:2], work[2:5], work[5], work[6]
+        self._left(problem, state, stop, OF_STEPS, fixed, left)
         done, contacts, past = passes / stop, end.contacts, end.past
         assert state.stepping_error is not None
         assert end.wear_exponents is not None
         assert end.order is not None
-        work, order = np.zeros((6, step.size)), np.empty(step.size, np.int64)
-        of_next, estimates, displaced = work[:2], work[2:5], work[5]
         if problem.has_spring:
             aim, scale = SHARE * self.tolerance, done**PART_EXPONENT / left
             of_loads, their_order, displaced = next_steps_of_loads(problem, end, scale, aim, KEEP)
@@ -190,7 +190,8 @@ class ImplicitStepper(StepDoublingStepper):
         past, depths, orders = end.past, end.stacked, np.asarray(end.order)
         errors, order = np.empty_like(depths), np.empty_like(orders)
         most = np.full_like(order, MAX_ORDER)
-        left = self._left(problem, state, stop, DOUBLED, state.irreducible)
+        left = np.empty(step.size)
+        self._left(problem, state, stop, DOUBLED, state.irreducible, left)
         if not problem.varying:  # many rows of a log average out within a step
             left = np.where(varies, np.maximum(left, LEAST_AIM_OF_ROWS), left)
         part = (end.passes / stop) ** PART_EXPONENT / left
@@ -221,8 +222,9 @@ class ImplicitStepper(StepDoublingStepper):
         stop: float,
         cover: tuple[float, float],
         fixed: FloatArray,
-    ) -> FloatArray:
-        """Return the part of its usual error that a step aims at, by the errors before it, (N,).
+        left: FloatArray,
+    ) -> None:
+        """Find the part of its usual error that a step aims at, by the errors before it.
 
         Parameters
         ----------
@@ -235,8 +237,10 @@ class ImplicitStepper(StepDoublingStepper):
             Safety factors that the errors of volume and profile of the state contain.
         fixed : ndarray, shape (3, realisations)
             `irreducible` of the state.
+        left : ndarray, shape (realisations,)
+            Result.
         """
-        return parts_of_aim(
+        parts_of_aim(
             self.tolerance,
             state.passes / stop,
             *cover,
@@ -247,6 +251,7 @@ class ImplicitStepper(StepDoublingStepper):
             state.past.separation,
             state.past.part,
             problem.volume_weights,
+            left,
         )
 
     def scheme(self, problem: WearProblem, state: WearState) -> Step:

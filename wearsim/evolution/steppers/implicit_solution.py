@@ -108,8 +108,9 @@ def step_by_formula(
         in_groove[:] = have_groove(problem, state)
     # line loads and wear about which the wear is linearised
     line_load, wear = contacts.line_load, wear_of_contacts(problem, contacts)
-    rows = np.empty((8, realisations))
-    of_tests, energy = rows[:7], rows[7]
+    rows = np.empty((11, realisations))
+    of_tests, energy, sizes = rows[:7], rows[7], rows[8:]
+    rest, opening, depth = sizes
     # values of the step, and the differences after it
     of_sums = np.empty((ROWS + 1, *past.sums.shape[1:]))
     of_feedback = np.empty((ROWS + 1, *past.feedback.shape[1:]))
@@ -150,18 +151,20 @@ def step_by_formula(
     exponents = of_strips.reshape(shape)
     loads = LoadsOfStep(problem, state, conditions, passes, feedback)
     stations, iterations = problem.shape[0], np.zeros(realisations, dtype=np.int64)
+    places: IntArray | None = None  # of the tests in progress, None for all
     most = MAX_LINEAR_EXPONENT if problem.linear_wear else MAX_EXPONENT
     for iteration in range(1, MAX_FIXED_POINT + 1):
         linearise_step(*of_step, line_load, wear, exponents, active, about, compliance)
-        batch = contact_batch(problem, about[2], loads.used, *separated(guess, stations))
+        worn_depths = guess[:stations, None], guess[None, stations:]
+        batch = contact_batch(problem, about[2], loads.used, *worn_depths)
         warm = contacts if near is None or iteration > 1 else near
-        solved = solve_compliant(problem, batch, compliance, warm, active)
+        solved = solve_compliant(problem, batch, compliance, warm, places)
         iterations[active] = iteration
         new, apart = wear_of_contacts(problem, solved), solved.separation
         apart = (
             past.separation if apart is None or not past.separation.size else kernel_input(apart)
         )
-        rest, opening, depth = compare_step(
+        compare_step(
             *of_step,
             line_load,
             wear,
@@ -175,6 +178,7 @@ def step_by_formula(
             most,
             active,
             worn,
+            sizes,
         )
         used, guess, change = guess, base + worn, rest
         # strips at an edge may enter and leave the contact in turn: relax the tolerance slowly
@@ -199,16 +203,18 @@ def step_by_formula(
                 np.divide(change, depth, out=last, where=stopped)
                 unsolved = np.nan_to_num(last, nan=np.inf, posinf=np.inf)
                 active &= ~stopped
-        if not active.nonzero()[0].size:
+        places = active.nonzero()[0]
+        if not places.size:
             break
         loads.used = loads.target
         if iteration < DAMPED_FROM:
             line_load, wear = solved.line_load, new
         else:  # strips at an edge enter and leave the contact in turn
             line_load, wear = 0.5 * (line_load + solved.line_load), 0.5 * (wear + new)
-    spans, ends = of_tests[2:], np.empty(depths.shape)
+    of_depths = np.empty((ROWS + 1, *depths.shape))
+    ends, past_wear = of_depths[0], of_depths[1:]
     fields = np.empty((3, *past.part.shape) if past.part.size else (0, 0, 0))
-    past_wear, past_sums, past_feedback = np.empty(past.wear.shape), of_sums[1:], of_feedback[1:]
+    spans, past_sums, past_feedback = of_tests[2:], of_sums[1:], of_feedback[1:]
     end_step(
         *of_step,
         past.separation,
@@ -390,9 +396,9 @@ def solve_compliant(
     batch: ContactBatch,
     compliance: FloatArray,
     warm: ContactBatchSolution,
-    active: BoolArray,
+    places: IntArray | None,
 ) -> ContactBatchSolution:
-    """Solve the contacts of the active realisations; the others keep their solutions.
+    """Solve the contacts of some realisations; the others keep their solutions.
 
     Parameters
     ----------
@@ -403,20 +409,22 @@ def solve_compliant(
         Wear compliance, as of `SharedWear`.
     warm : ContactBatchSolution
         Solutions to start from, in the problem's order.
-    active : ndarray of bool, shape (realisations,)
+    places : ndarray of int, optional
+        Realisations to solve, by default all.
 
     Returns
     -------
     ContactBatchSolution
-        In the problem's order; those of inactive realisations are taken from `warm`.
+        In the problem's order; those of other realisations are taken from `warm`.
     """
-    model, realisations = problem.model, active.size
-    coupled, numbers = problem.contacts_each, active.nonzero()[0]
-    if numbers.size == realisations and coupled == 1:
+    model, realisations, coupled = problem.model, len(compliance), problem.contacts_each
+    every = places is None or places.size == realisations
+    if every and coupled == 1:
         both = np.add.reduce(compliance, axis=2)
         return model.solve(batch, both.reshape(batch.gap.shape), None, warm)
-    if numbers.size == realisations == 1:
+    if every and realisations == 1:
         return model.solve(batch, None, SharedWear(problem.bodies, compliance), warm)
+    numbers = np.arange(realisations) if places is None else places
     # the contacts of one realisation next to each other, which the problem has `realisations` apart
     order = np.arange(len(batch)).reshape(coupled, realisations)[:, numbers].T.ravel()
     some, near, part = batch.at(order), warm.at(order), compliance[numbers]

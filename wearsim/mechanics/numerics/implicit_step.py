@@ -208,7 +208,8 @@ def compare_step(
     greatest_exponent: float,
     active: BoolArray,
     worn: FloatArray,
-) -> FloatArray:
+    sizes: FloatArray,
+) -> None:
     """Compare the wear of a new solution of the contacts with that linearised about another one.
 
     Parameters
@@ -231,11 +232,8 @@ def compare_step(
         Realisations that have not converged yet; the results of others remain.
     worn : ndarray, shape (bodies, realisations, strips)
         Result: wear of the bodies by the formula [m].
-
-    Returns
-    -------
-    ndarray, shape (3, realisations)
-        As of `wear_of_bodies`.
+    sizes : ndarray, shape (3, realisations)
+        Result: as of `wear_of_bodies`.
     """
     realisations, n, scale = len(active), gap.shape[1], of_bodies[0]
     slopes, linear = about[1], np.empty(gap.shape)
@@ -245,7 +243,7 @@ def compare_step(
         for side in range(2):
             for i in range(n):
                 new_wear[side, k, i] *= worn_passes[v] * scale[own, v, i]
-    sizes = wear_of_bodies(
+    sizes[:] = wear_of_bodies(
         loads,
         line_load,
         new_wear,
@@ -267,7 +265,6 @@ def compare_step(
     )
     for v in range(realisations):
         sizes[0, v] = max(sizes[0, v], of_edges[v] / OF_EDGES)
-    return sizes
 
 
 @kernel
@@ -412,7 +409,7 @@ def compile_implicit_step() -> None:
     )
     compare_step(
         *(*strips, strip, wear, apart, about, compliance, strip, strip, wear.copy(), one, 1.0),
-        *(resolved, rows.copy()),
+        *(resolved, rows.copy(), of_tests[:3]),
     )
     linearise_step(*strips, strip, wear, apart, resolved, about, compliance)
     begin_step(

@@ -339,8 +339,9 @@ def parts_of_aim(
     separation: FloatArray,
     part: FloatArray,
     volume_weights: FloatArray,
-) -> FloatArray:
-    """Return the part of its usual error that a step aims at, by the errors before it.
+    parts: FloatArray,
+) -> None:
+    """Find the part of its usual error that a step aims at, by the errors before it.
 
     Errors of the volume add up during a test if they have the same sign. Where edges are resolved,
     the error of the profile is that of the strips that an edge has just crossed. It decays as these
@@ -358,15 +359,14 @@ def parts_of_aim(
         Before the step [m^3], and relative.
     irreducible, depths, separation, part, volume_weights
         As of `assess_step` and `begin_step`, before the step.
-
-    Returns
-    -------
-    ndarray, shape (realisations,)
+    parts : ndarray, shape (realisations,)
+        Result.
     """
     bodies, realisations, n = depths.shape
     low, high = ADDED_UP
-    parts, resolved = np.ones(realisations), np.empty(realisations, np.bool_)
+    resolved = np.empty(realisations, np.bool_)
     fill_resolved(separation, part, resolved)
+    parts[:] = 1.0
     for v in range(realisations):
         # `assess_step` makes the error of the profile at least this part of that of the volume
         if profile_error[v] < OF_VOLUME[1] * low * tolerance:
@@ -384,7 +384,6 @@ def parts_of_aim(
             relative_size *= done[v] ** VOLUME_EXPONENT
             worst = max(relative_size, profile * done[v] ** DEPTH_EXPONENT) / tolerance
             parts[v] = min(max((high - worst) / (high - low), LEAST_AIM), 1.0)
-    return parts
 
 
 def compile_step_errors() -> None:
@@ -397,7 +396,9 @@ def compile_step_errors() -> None:
         *(spans, past, sums, strip, strip, np.array([[0, 1]]), strip, one, strip, wear, strip),
         *(one, 1.0, np.ones((2, 2)), rows[:, 0], order, errors),
     )
-    parts_of_aim(1e-3, one, 1.0, 1.0, one, one, errors, rows, strip, strip, np.ones((2, 2)))
+    parts_of_aim(
+        1e-3, one, 1.0, 1.0, one, one, errors, rows, strip, strip, np.ones((2, 2)), one.copy()
+    )
     compile_implicit_step()
 
 
