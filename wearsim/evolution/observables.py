@@ -6,7 +6,7 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatch
 from wearsim.evolution.contacts import at_least, contact_batch
-from wearsim.evolution.error_estimates import volume_of
+from wearsim.evolution.error_estimates import sizes, volume_of
 from wearsim.evolution.pauses import opened
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import (
@@ -111,6 +111,28 @@ def volume_error_by_stations(problem: WearProblem, state: WearState) -> FloatArr
     total = sum_in_order(weight * per_angle, axis=0)
     relative = integral_error(cam.panels, per_angle) / np.where(total > 0.0, total, np.inf)
     return np.asarray(relative * volume_of(problem, state.depths))
+
+
+def errors_by_order(stepper: Stepper, problem: WearProblem, state: WearState) -> FloatArray:
+    """Return the errors of steps in which different rollers pass at the same time.
+
+    They pass one after another, and the last turn may be incomplete: at any number of passes, each
+    of R rollers has made up to (R - 1)/R passes more or fewer than an R-th of them. The errors are
+    bounds of the wear by these passes. Those of the volume nearly cancel, as all passes together
+    are counted exactly.
+
+    Returns
+    -------
+    ndarray, shape (3, realisations)
+        Of depth [m], volume [m^3] and profile, relative, as `sizes`.
+    """
+    if stepper.pass_by_pass or problem.rollers == 1:
+        return np.zeros((3, state.passes.size))
+    cylinder, roller = problem.sum_of_parts(*problem.wear_parts(state.contacts, 1.0))
+    errors = np.abs(sizes(problem, state, np.concatenate([cylinder[:, 0], roller[0]])))
+    errors[[0, 2]] *= np.minimum(problem.kinematics.physical_rollers - 1.0, state.passes)
+    errors[1] *= np.minimum(1.0, state.passes)
+    return errors
 
 
 def depth(problem: WearProblem, state: WearState) -> FloatArray:

@@ -14,7 +14,11 @@ from wearsim.errors import StepError
 from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.error_estimates import greatest_depth
 from wearsim.evolution.integrate import Advance, Evolution, bisect_failures
-from wearsim.evolution.observables import depth_error_by_stations, volume_error_by_stations
+from wearsim.evolution.observables import (
+    depth_error_by_stations,
+    errors_by_order,
+    volume_error_by_stations,
+)
 from wearsim.evolution.observed_errors import observed_errors
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import ContactInputs, sum_in_order
@@ -259,11 +263,12 @@ def curves_at_end(
     return [a | b for a, b in zip(fatigue_curves(problem, state), curves, strict=True)]
 
 
-def scalars_of(problem: WearProblem, state: WearState) -> dict[str, float]:
+def scalars_of(stepper: Stepper, problem: WearProblem, state: WearState) -> dict[str, float]:
     """Return the scalars of a state of one realisation, by the names of `SCALARS`."""
     scalars = {name: float(getattr(state, name)[0]) for name in SCALARS}
-    scalars["depth_error"] += float(depth_error_by_stations(problem, state)[0])
-    scalars["volume_error"] += float(volume_error_by_stations(problem, state)[0])
+    by_order = errors_by_order(stepper, problem, state)[:, 0]
+    scalars["depth_error"] += float(depth_error_by_stations(problem, state)[0] + by_order[0])
+    scalars["volume_error"] += float(volume_error_by_stations(problem, state)[0] + by_order[1])
     return scalars
 
 
@@ -320,9 +325,8 @@ def _observed(runs: Sequence[RealisationRun]) -> list[RunObservations | Exceptio
         curves = curves_at_end(advance.problem.at(over), end.at(over), scenarios) if numbers else []
         for place, number, curve in zip(over.tolist(), numbers, curves, strict=True):
             chosen, grid = np.array([place]), advance.problem.grid
-            results[number] = RunObservations(
-                rows[number], scalars_of(advance.problem.at(chosen), end.at(chosen)), curve, grid
-            )
+            scalars = scalars_of(stepper, advance.problem.at(chosen), end.at(chosen))
+            results[number] = RunObservations(rows[number], scalars, curve, grid)
     add_strip_errors(runs, problem, courses, results)
     results |= tests.failures
     return [results[number] for number in range(len(runs))]

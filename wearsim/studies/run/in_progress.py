@@ -17,6 +17,7 @@ from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.limits import Limit
 from wearsim.evolution.observables import (
+    errors_by_order,
     present_batch,
 )
 from wearsim.evolution.observed_errors import (
@@ -232,9 +233,10 @@ class RunInProgress:
         rollers = self.present.kinematics.multiplicity @ last["roller_worn_volume"]
         depth = np.maximum(last["depth"], last["roller_depth"].max(axis=0))
         sizes = {"depth": depth, "volume": last["worn_volume"] + rollers}
+        by_order = errors_by_order(self.stepper, self.present, state)
         beyond: dict[str, list[tuple[str, str]]] = {}  # names and errors by remedy
         for kind, (name, size) in enumerate(sizes.items()):
-            relative, quadrature, scatter, strips, stations = (
+            relative, quadrature, scatter, strips, stations, order = (
                 float((part / np.where(size > 0.0, size, np.inf)).max())
                 for part in [
                     last[f"{name}_error"],
@@ -242,6 +244,7 @@ class RunInProgress:
                     SIGMAS * np.sqrt(state.scatter[kind]),
                     np.nan_to_num(last[f"{name}_error_by_strips"]),
                     last.get(f"{name}_error_by_stations", np.zeros(1)),
+                    by_order[kind],
                 ]
             )
             if relative <= tolerance:
@@ -263,6 +266,11 @@ class RunInProgress:
                     )
             elif stations > 0.5 * relative:
                 remedy = "more cam.stations decrease it"
+            elif order > 0.5 * relative:
+                remedy = (
+                    "the different rollers pass one after another:"
+                    ' evolution.stepper = "per-pass" takes their passes one by one'
+                )
             words = "worn volume" if name == "volume" else name
             of_roller = name == "depth" and (size > last["depth"]).any()
             whose = " of the roller depth" if of_roller else ""

@@ -239,6 +239,8 @@ def _set_wear(
     if not few:
         passes = min(max(work / factor, PASSES[0]), PASSES[1])
     passes = max(int(share * rounded(passes)), 10)
+    # whole turns: within a turn, steps do not know which of different rollers has passed
+    passes += -passes % sizes.rollers
     changes["operation.passes"] = passes
     if kind != "t-gamma":
         changes["wear.cylinder.k_over_h"] = f"{factor:.4g} 1/Pa"
