@@ -113,7 +113,9 @@ def volume_error_by_stations(problem: WearProblem, state: WearState) -> FloatArr
     return np.asarray(relative * volume_of(problem, state.depths))
 
 
-def errors_by_order(stepper: Stepper, problem: WearProblem, state: WearState) -> FloatArray:
+def errors_of_simultaneous_passes(
+    stepper: Stepper, problem: WearProblem, state: WearState
+) -> FloatArray:
     """Return the errors of steps in which different rollers pass at the same time.
 
     They pass one after another, and the last turn may be incomplete: at any number of passes, each

@@ -9,7 +9,7 @@ from tests.evolution import never
 from tests.studies.random_examples import CREEPAGE, FRICTION, LOAD, SLACK, WANDERING, scenario_of
 from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.integrate import evolve
-from wearsim.evolution.observables import errors_by_order
+from wearsim.evolution.observables import errors_of_simultaneous_passes
 from wearsim.evolution.steppers.stabilised import StabilisedStepper
 from wearsim.studies.ensemble import realisation
 from wearsim.studies.ensemble.batch import RealisationRun, batch_groups, observe
@@ -76,9 +76,11 @@ def test_batched_results_equal_those_of_a_recorded_run(case):
         for advance in evolve(run.problem, fresh, run.stepper, stop, never, 10**6):
             recorder.add(advance, stop)
         end = recorder.state
-        by_order = dict(zip(ERRORS, errors_by_order(run.stepper, run.problem, end), strict=True))
+        simultaneous = dict(
+            zip(ERRORS, errors_of_simultaneous_passes(run.stepper, run.problem, end), strict=True)
+        )
         for name, value in found.scalars.items():
-            assert value == getattr(end, name)[0] + by_order.get(name, [0.0])[0]
+            assert value == getattr(end, name)[0] + simultaneous.get(name, [0.0])[0]
         assert (found.curves["depth_profile"] == end.cylinder_depth[0, 0, 0]).all()
         depths = recorder.records["cylinder_depth_profile"].max(axis=(1, 2, 3))
         assert [row["depth"] for row in found.rows] == depths.tolist()

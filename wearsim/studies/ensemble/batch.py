@@ -16,7 +16,7 @@ from wearsim.evolution.error_estimates import greatest_depth
 from wearsim.evolution.integrate import Advance, Evolution, bisect_failures
 from wearsim.evolution.observables import (
     depth_error_by_stations,
-    errors_by_order,
+    errors_of_simultaneous_passes,
     volume_error_by_stations,
 )
 from wearsim.evolution.observed_errors import observed_errors
@@ -266,9 +266,9 @@ def curves_at_end(
 def scalars_of(stepper: Stepper, problem: WearProblem, state: WearState) -> dict[str, float]:
     """Return the scalars of a state of one realisation, by the names of `SCALARS`."""
     scalars = {name: float(getattr(state, name)[0]) for name in SCALARS}
-    by_order = errors_by_order(stepper, problem, state)[:, 0]
-    scalars["depth_error"] += float(depth_error_by_stations(problem, state)[0] + by_order[0])
-    scalars["volume_error"] += float(volume_error_by_stations(problem, state)[0] + by_order[1])
+    simultaneous = errors_of_simultaneous_passes(stepper, problem, state)[:, 0]
+    scalars["depth_error"] += float(depth_error_by_stations(problem, state)[0] + simultaneous[0])
+    scalars["volume_error"] += float(volume_error_by_stations(problem, state)[0] + simultaneous[1])
     return scalars
 
 

@@ -17,7 +17,7 @@ from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.limits import Limit
 from wearsim.evolution.observables import (
-    errors_by_order,
+    errors_of_simultaneous_passes,
     present_batch,
 )
 from wearsim.evolution.observed_errors import (
@@ -233,10 +233,10 @@ class RunInProgress:
         rollers = self.present.kinematics.multiplicity @ last["roller_worn_volume"]
         depth = np.maximum(last["depth"], last["roller_depth"].max(axis=0))
         sizes = {"depth": depth, "volume": last["worn_volume"] + rollers}
-        by_order = errors_by_order(self.stepper, self.present, state)
+        simultaneous = errors_of_simultaneous_passes(self.stepper, self.present, state)
         beyond: dict[str, list[tuple[str, str]]] = {}  # names and errors by remedy
         for kind, (name, size) in enumerate(sizes.items()):
-            relative, quadrature, scatter, strips, stations, order = (
+            relative, quadrature, scatter, strips, stations, rollers_together = (
                 float((part / np.where(size > 0.0, size, np.inf)).max())
                 for part in [
                     last[f"{name}_error"],
@@ -244,7 +244,7 @@ class RunInProgress:
                     SIGMAS * np.sqrt(state.scatter[kind]),
                     np.nan_to_num(last[f"{name}_error_by_strips"]),
                     last.get(f"{name}_error_by_stations", np.zeros(1)),
-                    by_order[kind],
+                    simultaneous[kind],
                 ]
             )
             if relative <= tolerance:
@@ -266,7 +266,7 @@ class RunInProgress:
                     )
             elif stations > 0.5 * relative:
                 remedy = "more cam.stations decrease it"
-            elif order > 0.5 * relative:
+            elif rollers_together > 0.5 * relative:
                 remedy = (
                     "the different rollers pass one after another:"
                     ' evolution.stepper = "per-pass" takes their passes one by one'

@@ -12,7 +12,7 @@ from wearsim.errors import ContactError, SolverError, StepError
 from wearsim.evolution.integrate import Advance
 from wearsim.evolution.observables import (
     depth,
-    errors_by_order,
+    errors_of_simultaneous_passes,
     groove_width,
     least_gaps,
     peak_pressures,
@@ -113,7 +113,7 @@ def history_row(
         "elastic_approach": np.where(loads > 0.0, elastic, 0.0),
     }
 
-    by_order = errors_by_order(stepper, problem, state)
+    simultaneous = errors_of_simultaneous_passes(stepper, problem, state)
 
     def per_roller(name: str) -> FloatArray:
         return problem.per_roller(problem.values_of(state.contacts, name))
@@ -131,9 +131,9 @@ def history_row(
         "dissipated_energy": state.energy,
         "power": problem.total_power(problem.values_of(state.contacts, "power")),
         "normal_force": problem.mean_over_turn(problem.per_roller(loads))[0],
-        "depth_error_by_steps": state.depth_error + by_order[0],
-        "volume_error_by_steps": state.volume_error + by_order[1],
-        "profile_error_by_steps": state.profile_error + by_order[2],
+        "depth_error_by_steps": state.depth_error + simultaneous[0],
+        "volume_error_by_steps": state.volume_error + simultaneous[1],
+        "profile_error_by_steps": state.profile_error + simultaneous[2],
         "rejected": state.rejected,
         "solves": state.solves,
         "full_solves": state.full_solves,
