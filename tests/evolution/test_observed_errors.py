@@ -9,7 +9,13 @@ import numpy as np
 import pytest
 
 import wearsim
-from wearsim.evolution.observed_errors import COVER, COVER_OF_FREE, observed_errors
+from wearsim.evolution.observed_errors import (
+    COVER,
+    COVER_OF_FREE,
+    OF_PEAKS,
+    OF_SEVERAL_PEAKS,
+    observed_errors,
+)
 from wearsim.evolution.strip_errors import Course
 from wearsim.types import FloatArray
 
@@ -101,13 +107,20 @@ def of_exact_sizes(
 
 
 @pytest.mark.parametrize(("free", "cover"), [(False, COVER), (True, COVER_OF_FREE)])
-def test_error_is_the_greatest_of_the_last_differences(free: bool, cover: float) -> None:
+@pytest.mark.parametrize(
+    ("name", "rollers", "of_peaks"),
+    [("power", 1, 1.0), ("peak_pressure", 1, OF_PEAKS), ("peak_pressure", 2, OF_SEVERAL_PEAKS)],
+)
+def test_error_is_the_greatest_of_the_last_differences(
+    free: bool, cover: float, name: str, rollers: int, of_peaks: float
+) -> None:
     passes = np.array([0.0, 10.0, 20.0, 40.0, 80.0])
-    pressure = np.array([3.0, 2.0, 2.0, 2.0, 2.0])
-    other = pressure * np.array([1.0, 1.1, 1.0, 1.0, 1.0])
-    course = Course(passes[1:].tolist(), observed={"peak_pressure": other})
-    found = of_exact_sizes(course, passes, {"peak_pressure": pressure}, free)["peak_pressure"]
-    np.testing.assert_allclose(found[[0, 1]], [0.0, cover * 0.2], atol=1e-12)
+    values = np.repeat([[3.0], [2.0], [2.0], [2.0], [2.0]], rollers, axis=1)
+    other = values * np.array([[1.0], [1.1], [1.0], [1.0], [1.0]])
+    course = Course(passes[1:].tolist(), observed={name: other})
+    found = of_exact_sizes(course, passes, {name: values}, free)[name]
+    np.testing.assert_allclose(found[0], 0.0, atol=1e-12)
+    np.testing.assert_allclose(found[1], cover * of_peaks * 0.2, atol=1e-12)
     np.testing.assert_allclose(found[3:], 0.0, atol=1e-12)  # it is no longer recent
 
 

@@ -39,6 +39,9 @@ COVER = 1.5
 # the same for free rollers. Their creepage is found from a sum of tractions of both signs, and the
 # error of this sum may decrease more slowly than the width of the strips
 COVER_OF_FREE = 2.5
+# further factors on differences of peak pressures, of one roller and of several that differ: where
+# the edge of a roller is in the groove of another, the pressure has a narrow peak
+OF_PEAKS, OF_SEVERAL_PEAKS = 1.35, 2.0
 # relative difference from other steps above which a pressure of the coarse test is a peak that the
 # test does not have: where edges are resolved, the long steps of the coarse test raise its pressure
 # by up to a half after strips have come into contact, while its errors by strips vary by 1 %
@@ -167,6 +170,9 @@ def observed_errors(
     part = np.column_stack([np.interp(at_passes, at_common, column) for column in greatest.T])
     part *= COVER_OF_FREE if free else COVER
     estimates = dict(zip(observed, np.split(part, np.cumsum(widths)[:-1], axis=1), strict=True))
+    if "peak_pressure" in estimates:
+        several = estimates["peak_pressure"].shape[1] > 1
+        estimates["peak_pressure"] *= OF_SEVERAL_PEAKS if several else OF_PEAKS
     worn = np.array([np.maximum(sizes[0], sizes[1]), sizes[2]])
     least = by_strips[:2] / np.where(worn > 0.0, worn, np.inf)
     errors, has_edges = {}, observed.keys() >= {"width", *OF_EDGES}
