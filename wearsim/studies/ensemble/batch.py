@@ -263,13 +263,14 @@ def curves_at_end(
     return [a | b for a, b in zip(fatigue_curves(problem, state), curves, strict=True)]
 
 
-def scalars_of(stepper: Stepper, problem: WearProblem, state: WearState) -> dict[str, float]:
-    """Return the scalars of a state of one realisation, by the names of `SCALARS`."""
-    scalars = {name: float(getattr(state, name)[0]) for name in SCALARS}
-    simultaneous = errors_of_simultaneous_passes(stepper, problem, state)[:, 0]
-    scalars["depth_error"] += float(depth_error_by_stations(problem, state)[0] + simultaneous[0])
-    scalars["volume_error"] += float(volume_error_by_stations(problem, state)[0] + simultaneous[1])
-    return scalars
+def scalars_of(stepper: Stepper, problem: WearProblem, state: WearState) -> list[dict[str, float]]:
+    """Return the scalars of each realisation of a state by the names of `SCALARS`."""
+    columns = {name: np.array(getattr(state, name), dtype=float) for name in SCALARS}
+    simultaneous = errors_of_simultaneous_passes(stepper, problem, state)
+    columns["depth_error"] += depth_error_by_stations(problem, state) + simultaneous[0]
+    columns["volume_error"] += volume_error_by_stations(problem, state) + simultaneous[1]
+    rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+    return [dict(zip(columns, row, strict=True)) for row in rows]
 
 
 def in_group(
@@ -321,12 +322,13 @@ def _observed(runs: Sequence[RealisationRun]) -> list[RunObservations | Exceptio
         going = [number not in deep for number in advance.numbers.tolist()]
         over = np.flatnonzero((end.passes >= stop) & going)
         numbers = advance.numbers[over].tolist()
-        scenarios = [runs[number].scenario for number in numbers]
-        curves = curves_at_end(advance.problem.at(over), end.at(over), scenarios) if numbers else []
-        for place, number, curve in zip(over.tolist(), numbers, curves, strict=True):
-            chosen, grid = np.array([place]), advance.problem.grid
-            scalars = scalars_of(stepper, advance.problem.at(chosen), end.at(chosen))
-            results[number] = RunObservations(rows[number], scalars, curve, grid)
+        if numbers:
+            last = advance.problem.at(over), end.at(over)
+            curves = curves_at_end(*last, [runs[number].scenario for number in numbers])
+            for number, scalars, curve in zip(
+                numbers, scalars_of(stepper, *last), curves, strict=True
+            ):
+                results[number] = RunObservations(rows[number], scalars, curve, last[0].grid)
     add_strip_errors(runs, problem, courses, results)
     results |= tests.failures
     return [results[number] for number in range(len(runs))]

@@ -339,7 +339,7 @@ class _Group:
         problem, state = problems.at(chosen), states.at(chosen)
         rows = [self.first_rows[number], *self._observed(problem, state)]
         scalars = {
-            **scalars_of(self.stepper, problem, state),
+            **scalars_of(self.stepper, problem, state)[0],
             **life,
             "first_limit": float(test.limit),
             "limit_angle": self._angle(test.limit, problem, state),
