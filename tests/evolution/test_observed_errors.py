@@ -122,6 +122,11 @@ def test_error_is_the_greatest_of_the_last_differences(
     np.testing.assert_allclose(found[0], 0.0, atol=1e-12)
     np.testing.assert_allclose(found[1], cover * of_peaks * 0.2, atol=1e-12)
     np.testing.assert_allclose(found[3:], 0.0, atol=1e-12)  # it is no longer recent
+    known = np.ones((3, len(passes)))
+    of_cam = observed_errors(
+        course, passes, {name: values}, known, 0.0 * known, free=free, cam=True
+    )[name]
+    np.testing.assert_allclose(of_cam[1], cover * 0.2, atol=1e-12)
 
 
 def test_peaks_of_the_coarse_test_at_one_or_two_steps_are_no_error() -> None:

@@ -39,8 +39,8 @@ COVER = 1.5
 # the same for free rollers. Their creepage is found from a sum of tractions of both signs, and the
 # error of this sum may decrease more slowly than the width of the strips
 COVER_OF_FREE = 2.5
-# further factors on differences of peak pressures, of one roller and of several that differ: where
-# the edge of a roller is in the groove of another, the pressure has a narrow peak
+# further factors on differences of peak pressures on a cylinder, of one roller and of several that
+# differ: where the edge of a roller is in the groove of another, the pressure has a narrow peak
 OF_PEAKS, OF_SEVERAL_PEAKS = 1.35, 2.0
 # relative difference from other steps above which a pressure of the coarse test is a peak that the
 # test does not have: where edges are resolved, the long steps of the coarse test raise its pressure
@@ -95,6 +95,7 @@ def observed_errors(
     load: Callable[[FloatArray], FloatArray] | None = None,
     feedback: bool = True,
     free: bool = False,
+    cam: bool = False,
 ) -> dict[str, FloatArray]:
     """Return the estimated errors of observables of a test.
 
@@ -118,8 +119,8 @@ def observed_errors(
         Returns the load before feedback at some passes [N]; None for a constant one.
     feedback : bool
         Whether the normal force depends on wear or power.
-    free : bool
-        Whether the rollers are free.
+    free, cam : bool
+        Whether the rollers are free, and whether they are on a cam.
     """
     if not observed:
         return {}
@@ -170,7 +171,7 @@ def observed_errors(
     part = np.column_stack([np.interp(at_passes, at_common, column) for column in greatest.T])
     part *= COVER_OF_FREE if free else COVER
     estimates = dict(zip(observed, np.split(part, np.cumsum(widths)[:-1], axis=1), strict=True))
-    if "peak_pressure" in estimates:
+    if "peak_pressure" in estimates and not cam:
         several = estimates["peak_pressure"].shape[1] > 1
         estimates["peak_pressure"] *= OF_SEVERAL_PEAKS if several else OF_PEAKS
     worn = np.array([np.maximum(sizes[0], sizes[1]), sizes[2]])

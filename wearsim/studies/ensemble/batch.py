@@ -387,6 +387,7 @@ def add_strip_errors(
                 np.pad(sizes, ((0, 0), (1, 0))),  # 0 at the start
                 np.pad(by_strips, ((0, 0), (1, 0))),
                 free=problem.free,
+                cam=problem.shape[0] > 1,
             )
             added[number] = errors, {name: values[-1] for name, values in stated.items()}
             result.scalars["depth_error"] += float(errors[0])

@@ -224,6 +224,7 @@ class RunInProgress:
             partial(load_before_feedback, problem) if varies else None,
             feedback=problem.has_spring or bool(problem.terms),
             free=problem.free,
+            cam=problem.shape[0] > 1,
         )
 
     def _check_errors(self, data: RunData) -> None:
