@@ -9,7 +9,7 @@ import wearsim
 from tests.evolution import SCENARIOS
 from wearsim.studies.run.result import Result
 
-#: rollers of different yaw; they wear a groove of 6 um in 31 passes
+#: a high wear factor: rollers of different tilt wear a groove of 6 um in 31 passes
 FEW = {
     "operation.passes": 31,
     "wear.cylinder.k_over_h": "1e-7 1/Pa",
