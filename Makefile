@@ -61,7 +61,7 @@ lint: style
 bench-docs: $(VENV)/.installed-dev
 	mkdir -p out
 	$(BIN)/wearsim bench stepping -o out/bench --force && cp out/bench/stepping.json $(MEASURED)
-	$(BIN)/wearsim bench stated-errors --tests 200 --seed 20261208 --references out/references -j $$(nproc) -o out/bench --force \
+	$(BIN)/wearsim bench stated-errors --tests 200 --seed 20261209 --references out/references -j $$(nproc) -o out/bench --force \
 		&& cp out/bench/stated-errors.json $(MEASURED)
 	$(BIN)/wearsim bench random --tests 300 --seed 5 -j $$(nproc) -o out/bench --force && cp out/bench/random.json $(MEASURED)
 	-$(BIN)/wearsim bench --hard -o out/bench --force

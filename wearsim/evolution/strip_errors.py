@@ -45,7 +45,7 @@ LOOSEST = 0.1  # greatest tolerance of a coarse test
 # depend on the strips, where it does, and before wear: later, wear reduces errors of the shape
 COVER, PARTIAL_COVER, FRESH_COVER = (
     np.array(factors)[:, None]
-    for factors in ((0.25, 0.45, 0.9), (0.75, 0.85, 1.3), (1.35, 1.3, 1.8))
+    for factors in ((0.25, 0.42, 0.9), (0.75, 0.72, 1.3), (1.35, 1.15, 1.8))
 )
 OF_PROFILE = 0.1  # least relative errors of depth and volume over that of the profile
 # the same of the volume worn in a contact that adheres, before wear has changed it

@@ -1,72 +1,41 @@
-"""True and stated errors of power, force, pressure and other observables at the end of a test.
-
-Their true values are those of the contacts on the worn profiles of the reference.
-"""
+"""True and stated errors of power, force, pressure and other observables at the end of a test."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
-from wearsim.errors import StepError
-from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
-from wearsim.evolution.steppers.single_step import solve_at_record
+from wearsim.evolution.steppers.base import Stepper
 from wearsim.studies.run.recorder import history_row
 from wearsim.studies.run.result import Result
 from wearsim.studies.run.schema import ESTIMATED
-from wearsim.types import FloatArray, Grid
-from wearsim_bench.stated_errors.random_tests import TRUE_TOLERANCE, RandomTest
-from wearsim_bench.stated_errors.references import Reference
-from wearsim_bench.stepping.runs import PreparedTest
+from wearsim.types import FloatArray
 
-#: names of the observables; energy and damage do not follow from the worn profiles
-OBSERVED = tuple(name for name in ESTIMATED if name not in {"dissipated_energy", "damage"})
+#: names of the observables
+OBSERVED = tuple(ESTIMATED)
 
 
-def observed_of(test: RandomTest, reference: Reference) -> dict[str, FloatArray]:
-    """Return the true observables at the end of a test by name.
-
-    There are none with a thermal load, and where a spring has lost its load: profiles do not
-    determine how much is left.
+def observed_of(
+    stepper: Stepper, problem: WearProblem, state: WearState, threshold: float
+) -> dict[str, FloatArray]:
+    """Return the observables of a state by name, each of shape (1,) or (rollers,).
 
     Parameters
     ----------
-    test : RandomTest
-        The test.
-    reference : Reference
-        Its worn profiles.
+    stepper, problem, state
+        Stepper of a test, its problem, and the state.
+    threshold : float
+        Depth that bounds the groove's width [m].
     """
-    grid = Grid(reference.y, float(reference.y[1] - reference.y[0]))
-    scenario = test.scenario(evolution__tolerance=TRUE_TOLERANCE)
-    prepared = PreparedTest(scenario, grid)
-    problem = prepared.problem
-    if problem.terms:  # the present load follows from the course of the power
-        return {}
-    try:
-        state = _worn_state(problem, reference)
-    except StepError:
-        return {}
-    row = history_row(prepared.stepper, problem, state, scenario.outputs.width_threshold)
+    row = history_row(stepper, problem, state, threshold)
     return {name: np.ravel(row[name]) for name in OBSERVED if name in row}
 
 
-def _worn_state(problem: WearProblem, reference: Reference) -> WearState:
-    """Return the state on the profiles of a reference, with its contacts."""
-    solved = np.unique(problem.kinematics.track.places, return_index=True)[1]  # equal ones once
-    cylinder = reference.cylinder_depth[solved]
-    state = fresh_state(problem).replaced(
-        cylinder_depth=cylinder,
-        roller_depth=reference.roller_depth,
-        passes=np.array([reference.passes]),
-    )
-    contacts, _ = solve_at_record(problem, state, on_profile=False, cold=True)
-    return state.replaced(contacts=contacts)
-
-
-def errors_of(result: Result, true: dict[str, FloatArray]) -> dict[str, tuple[float, float]]:
+def errors_of(result: Result, true: Mapping[str, FloatArray]) -> dict[str, tuple[float, float]]:
     """Return true and stated errors at the end of a run by observable.
 
     Errors are relative to the greatest value over the rollers; those of angles are in radians. Of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -19,12 +19,14 @@ from wearsim.evolution.error_estimates import DEPTHS, greatest_depth, volume_of
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import Depths, WearState
+from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.implicit import ImplicitStepper
 from wearsim.evolution.steppers.per_pass import is_compiled
 from wearsim.evolution.strips import same_strips
 from wearsim.studies.run.draws import draw
 from wearsim.studies.run.setup import Setup
 from wearsim.types import FloatArray, Grid
+from wearsim_bench.stated_errors.observed import OBSERVED, observed_of
 from wearsim_bench.stated_errors.random_tests import TRUE_TOLERANCE, RandomTest
 from wearsim_bench.stated_errors.strata import FEW_PASSES
 from wearsim_bench.stepping.groups import EVERY_PASS
@@ -42,9 +44,11 @@ PILOT_TOLERANCE, PILOT_STRIPS, WIDENED = 1e-2, 8.0, 1.6
 MOST_PILOTS = 14
 SECONDS = 300.0  # limit on the process time of a reference, which other work does not change
 _FAILURE = "failure"  # name of the reason for which there is no reference
+_OBSERVABLE = "observed_"  # prefix of the names of observables in files
 SETTINGS = hashlib.sha256(
     repr(
-        (EACH_PASS, LOOSE_FROM, LONGEST_STEP, PER_PATCH, PER_GROOVE, LEAST_STRIPS, MOST_STRIPS)
+        (EACH_PASS, LOOSE_FROM, LONGEST_STEP)
+        + (PER_PATCH, PER_GROOVE, LEAST_STRIPS, MOST_STRIPS, OBSERVED)
     ).encode()
 ).hexdigest()[:4]  # in the names of files, so that those of other settings are not read
 
@@ -63,12 +67,14 @@ class Reference:
         Position of the strips [m].
     cylinder_depth, roller_depth : ndarray
         Worn depths, shapes as in `WearState` [m].
-    passes, depth, volume : float
-        Passes, greatest depth of all bodies [m], and volume worn off all bodies [m^3].
+    depth, volume : float
+        Greatest depth of all bodies [m], and volume worn off all bodies [m^3].
     by_strips, by_steps : ndarray, shape (3,)
         Relative changes of depth, profile and volume with half the strips, and on those strips
         with ten times the tolerance and twice as long steps; steps are zero where each pass is
         solved.
+    observed : mapping of str to ndarray
+        Observables by name.
     """
 
     method: str
@@ -76,16 +82,30 @@ class Reference:
     y: FloatArray
     cylinder_depth: FloatArray
     roller_depth: FloatArray
-    passes: float
     depth: float
     volume: float
     by_strips: FloatArray
     by_steps: FloatArray
+    observed: Mapping[str, FloatArray]
 
     @property
     def profiles(self) -> FloatArray:
         """Depths of all bodies, shape (bodies, strips) [m]."""
         return stacked(self.cylinder_depth, self.roller_depth)
+
+    @property
+    def arrays(self) -> dict[str, Any]:
+        """The fields by name, and the observables by names with a prefix."""
+        fields = {name: value for name, value in vars(self).items() if name != "observed"}
+        return fields | {_OBSERVABLE + name: values for name, values in self.observed.items()}
+
+    @staticmethod
+    def from_arrays(arrays: Mapping[str, Any]) -> Reference:
+        """Return the reference with these `arrays`."""
+        names = [name for name in arrays if name.startswith(_OBSERVABLE)]
+        fields = {name: value for name, value in arrays.items() if name not in names}
+        observed = {name.removeprefix(_OBSERVABLE): arrays[name] for name in names}
+        return Reference(**fields, observed=observed)
 
 
 @dataclass(frozen=True)
@@ -157,8 +177,8 @@ def worn_at_end(
     until: float = np.inf,
     grows: bool = False,
     keeps_edges: bool = False,
-) -> tuple[str, WearProblem, WearState]:
-    """Return method, problem and final state of a test on given strips.
+) -> tuple[str, Stepper, WearProblem, WearState]:
+    """Return method, stepper, problem and final state of a test on given strips.
 
     Parameters
     ----------
@@ -204,7 +224,7 @@ def worn_at_end(
         state, final = advance.end, advance.problem
         if time.process_time() > until:
             raise SolverError(f"the reference takes longer than {SECONDS:g} s")
-    return method, final, state
+    return method, stepper, final, state
 
 
 def time_limit() -> float:
@@ -244,7 +264,7 @@ def final_grid(test: RandomTest, until: float) -> tuple[Grid, float, float]:
         grid = Grid.spanning(centre - half, centre + half, strips)
         half *= WIDENED
         try:
-            _, _, state = worn_at_end(test, grid, PILOT_TOLERANCE, until=until)
+            *_, state = worn_at_end(test, grid, PILOT_TOLERANCE, until=until)
         except ContactError as error:  # the contact is wider than the strips
             reason = str(error)
             continue
@@ -284,7 +304,7 @@ def reference_of(test: RandomTest, folder: Path | None) -> Reference:
         If the file cannot be read or written.
     """
     path = None if folder is None else folder / f"{test.name}-{test.digest}-{SETTINGS}.npz"
-    return Reference(**kept(path, lambda: vars(computed_reference(test))))
+    return Reference.from_arrays(kept(path, lambda: computed_reference(test).arrays))
 
 
 def kept(path: Path | None, compute: Callable[[], dict[str, Any]]) -> dict[str, Any]:
@@ -324,12 +344,12 @@ def computed_reference(test: RandomTest) -> Reference:
     grid = fine_grid(coarse, patch, groove, contacts[0] * contacts[1])
     tolerance = TRUE_TOLERANCE * (10.0 if contacts[0] * contacts[1] >= LOOSE_FROM else 1.0)
     half = Grid.spanning(*grid.edges, grid.strips // 2 + (grid.strips // 2 + 1) % 2)
-    method, problem, end = worn_at_end(test, grid, tolerance, LONGEST_STEP, until=until)
+    method, stepper, problem, end = worn_at_end(test, grid, tolerance, LONGEST_STEP, until=until)
     fine = worn_of(problem, end)
-    halved = worn_of(*worn_at_end(test, half, tolerance, LONGEST_STEP, until=until)[1:])
+    halved = worn_of(*worn_at_end(test, half, tolerance, LONGEST_STEP, until=until)[2:])
     by_steps = np.zeros(3)
     if method != EVERY_PASS:
-        loose = worn_at_end(test, half, 10.0 * tolerance, 2.0 * LONGEST_STEP, until=until)[1:]
+        loose = worn_at_end(test, half, 10.0 * tolerance, 2.0 * LONGEST_STEP, until=until)[2:]
         by_steps = worn_of(*loose).changes_from(halved)
     depths = dict(zip(DEPTHS, at_all_stations(problem, end), strict=True))
     return Reference(
@@ -337,11 +357,11 @@ def computed_reference(test: RandomTest) -> Reference:
         seconds=time.process_time() - until + SECONDS,
         y=grid.y,
         **depths,
-        passes=float(end.passes[0]),
         depth=fine.depth,
         volume=fine.volume,
         by_strips=halved.changes_from(fine),
         by_steps=by_steps,
+        observed=observed_of(stepper, problem, end, test.scenario().outputs.width_threshold),
     )
 
 
@@ -364,7 +384,7 @@ def on_strips(test: RandomTest, start: Grid, end: Grid, folder: Path | None) -> 
     def compute() -> dict[str, Any]:
         grows = not same_strips(start, end)
         steps = TRUE_TOLERANCE, LONGEST_STEP
-        _, problem, state = worn_at_end(
+        *_, problem, state = worn_at_end(
             test, start, *steps, until=time_limit(), grows=grows, keeps_edges=True
         )
         return vars(worn_of(problem, state))

@@ -18,7 +18,7 @@ from wearsim.studies.run.run import run
 from wearsim.types import FloatArray, Grid
 from wearsim_bench.contact.worn_profiles import failure_reason
 from wearsim_bench.measure.measurement import Measurement
-from wearsim_bench.stated_errors.observed import errors_of, observed_of
+from wearsim_bench.stated_errors.observed import errors_of
 from wearsim_bench.stated_errors.random_tests import RandomTest
 from wearsim_bench.stated_errors.references import Worn, on_strips, reference_of, stacked
 
@@ -59,7 +59,7 @@ def measured(test: RandomTest, folder: Path | None) -> Measurement:
     try:
         reference = reference_of(test, folder)
         same, grew = _without_stepping_error(test, result, folder)
-        observed = errors_of(result, observed_of(test, reference))
+        observed = errors_of(result, reference.observed)
     except Exception as error:
         return _failed(row, LACKS, error)
     worn = worn_of_result(result)
