@@ -267,7 +267,8 @@ class ContactBatchSolution:
         """Return these solutions with others at some numbers."""
         both = self.separation is not None and others.separation is not None
         names = (*_OUTPUTS, "separation") if both else _OUTPUTS
-        columns = {name: getattr(self, name).copy() for name in names}
+        copied = np.empty_like if numbers.size == len(self) else np.copy
+        columns = {name: copied(getattr(self, name)) for name in names}
         for name, column in columns.items():
             column[numbers] = getattr(others, name)
         return ContactBatchSolution(self.y, **columns)

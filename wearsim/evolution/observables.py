@@ -137,6 +137,16 @@ def errors_of_simultaneous_passes(
     return errors
 
 
+def errors_before_strips(
+    stepper: Stepper, problem: WearProblem, state: WearState
+) -> tuple[FloatArray, FloatArray]:
+    """Return the errors of depth [m] and volume [m^3] without those by strips, (realisations,)."""
+    of_depth, of_volume, _ = errors_of_simultaneous_passes(stepper, problem, state)
+    of_depth = of_depth + depth_error_by_stations(problem, state)
+    of_volume = of_volume + volume_error_by_stations(problem, state)
+    return state.depth_error + of_depth, state.volume_error + of_volume
+
+
 def depth(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the greatest depth of the cylinder, shape (realisations,) [m]."""
     return problem.kinematics.track.greatest_value(state.cylinder_depth[:, 0].max(axis=-1))

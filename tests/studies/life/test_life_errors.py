@@ -59,3 +59,25 @@ def test_bounds_include_peaks_at_the_ends_of_rollers() -> None:
     assert (np.abs(found.values("life") / true - 1.0) > 0.05).all()
     assert (found.values("life_low") <= true).all()
     assert (true <= found.values("life_high")).all()
+
+
+def test_bounds_include_the_order_of_different_rollers() -> None:
+    # rollers of different tilt, in steps at the same time, and one after another
+    changes: dict[str, object] = {
+        "load": {"normal_force": "307 N"},
+        "operation.rollers": 3,
+        "creepage.tilt": ["-0.7 mrad", "1.2 mrad", "0 mrad"],
+        "wear.roller.k_over_h": "2e-8 1/Pa",
+        "contact.strips": 81,
+        "contact.width": "14 mm",
+        "evolution.tolerance": 1e-4,
+        "evolution.strip_error": False,
+    }
+    limit = {"depth": "4 um"}
+    found = lives(limit, "1e-7 1/Pa", **changes)
+    single = lives(limit, "1e-7 1/Pa", **changes, evolution__stepper="per-pass")
+    low, high = found.values("life_low"), found.values("life_high")
+    true = single.values("life")
+    assert (np.abs(found.values("life") / true - 1.0) > 1e-3).any()
+    assert (low <= true).all()
+    assert (true <= high).all()

@@ -65,7 +65,7 @@ CONTINUE = -1
 
 # predicted change of the next step, relative to the greatest line load; where contacts wear, their
 # wear compliance is iterated in each step of the wear test, and less accuracy is sufficient
-TOLERANCE, WEAR_TOLERANCE = 1e-8, 1e-7
+TOLERANCE, WEAR_TOLERANCE = 1e-8, 1e-6
 SHRINKING = 0.2  # ratio of successive steps up to which Jacobians may be reused
 FIRST = 0.1  # assumed ratio of the second step to the first
 MUCH = 0.05  # share of the load that starting line loads lack and a foundation corrects

@@ -14,11 +14,7 @@ from wearsim.errors import StepError
 from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.error_estimates import greatest_depth
 from wearsim.evolution.integrate import Advance, Evolution, bisect_failures
-from wearsim.evolution.observables import (
-    depth_error_by_stations,
-    errors_of_simultaneous_passes,
-    volume_error_by_stations,
-)
+from wearsim.evolution.observables import errors_before_strips
 from wearsim.evolution.observed_errors import observed_errors
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import ContactInputs, sum_in_order
@@ -266,9 +262,8 @@ def curves_at_end(
 def scalars_of(stepper: Stepper, problem: WearProblem, state: WearState) -> list[dict[str, float]]:
     """Return the scalars of each realisation of a state by the names of `SCALARS`."""
     columns = {name: np.array(getattr(state, name), dtype=float) for name in SCALARS}
-    simultaneous = errors_of_simultaneous_passes(stepper, problem, state)
-    columns["depth_error"] += depth_error_by_stations(problem, state) + simultaneous[0]
-    columns["volume_error"] += volume_error_by_stations(problem, state) + simultaneous[1]
+    errors = errors_before_strips(stepper, problem, state)
+    columns["depth_error"], columns["volume_error"] = errors
     rows = zip(*(values.tolist() for values in columns.values()), strict=True)
     return [dict(zip(columns, row, strict=True)) for row in rows]
 

@@ -24,10 +24,10 @@ from wearsim.evolution.limits import (
 )
 from wearsim.evolution.observables import (
     depth,
+    errors_before_strips,
     extremes,
     lift_errors,
     peak_pressures,
-    volume_error_by_stations,
 )
 from wearsim.evolution.observed_errors import OF_EDGES, edge_peaks, relative_crown_radius
 from wearsim.evolution.problem import WearProblem
@@ -214,8 +214,7 @@ class _Group:
         slope, of_depth = self._slopes(crossing)
         depths = greatest_depth(state.depths)
         by_stations = self._errors_by_stations(problem, state)
-        error_of_depth = state.depth_error + by_stations["depth"]
-        error_of_volume = state.volume_error + volume_error_by_stations(problem, state)
+        error_of_depth, error_of_volume = errors_before_strips(self.stepper, problem, state)
         depth_error = error_of_depth / np.maximum(depth(problem, state), 1e-300)
         limits = [self.limits[number] for number in crossing.limit.tolist()]
         if any(limit.quantity == "peak pressure" for limit in limits):
@@ -249,7 +248,6 @@ class _Group:
         extreme_values = extremes(problem, state)
         lift = extreme_values["least_wear"].error + extreme_values["greatest_wear"].error
         errors = {
-            "depth": extreme_values["depth"].error,
             "lift error": lift.max(axis=0),
             "peak pressure": extreme_values["peak_pressure"].error.max(axis=0),
         }

@@ -45,12 +45,10 @@ MOST_PILOTS = 14
 SECONDS = 300.0  # limit on the process time of a reference, which other work does not change
 _FAILURE = "failure"  # name of the reason for which there is no reference
 _OBSERVABLE = "observed_"  # prefix of the names of observables in files
-SETTINGS = hashlib.sha256(
-    repr(
-        (EACH_PASS, LOOSE_FROM, LONGEST_STEP)
-        + (PER_PATCH, PER_GROOVE, LEAST_STRIPS, MOST_STRIPS, OBSERVED)
-    ).encode()
-).hexdigest()[:4]  # in the names of files, so that those of other settings are not read
+_STEPS, _STRIPS = (EACH_PASS, LOOSE_FROM, LONGEST_STEP), (PER_PATCH, PER_GROOVE, LEAST_STRIPS)
+SETTINGS = hashlib.sha256(repr((*_STEPS, *_STRIPS, MOST_STRIPS, OBSERVED)).encode()).hexdigest()[
+    :4
+]  # in the names of files, so that those of other settings are not read
 
 
 @dataclass(frozen=True)
