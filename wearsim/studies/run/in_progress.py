@@ -16,10 +16,7 @@ from wearsim.errors import Interrupted, ResultsFileError, SolverError, failure_t
 from wearsim.evolution.contacts import fresh_state
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.limits import Limit
-from wearsim.evolution.observables import (
-    errors_of_simultaneous_passes,
-    present_batch,
-)
+from wearsim.evolution.observables import present_batch
 from wearsim.evolution.observed_errors import (
     load_before_feedback,
     observed_errors,
@@ -234,7 +231,6 @@ class RunInProgress:
         rollers = self.present.kinematics.multiplicity @ last["roller_worn_volume"]
         depth = np.maximum(last["depth"], last["roller_depth"].max(axis=0))
         sizes = {"depth": depth, "volume": last["worn_volume"] + rollers}
-        simultaneous = errors_of_simultaneous_passes(self.stepper, self.present, state)
         beyond: dict[str, list[tuple[str, str]]] = {}  # names and errors by remedy
         for kind, (name, size) in enumerate(sizes.items()):
             relative, quadrature, scatter, strips, stations, rollers_together = (
@@ -245,7 +241,7 @@ class RunInProgress:
                     SIGMAS * np.sqrt(state.scatter[kind]),
                     np.nan_to_num(last[f"{name}_error_by_strips"]),
                     last.get(f"{name}_error_by_stations", np.zeros(1)),
-                    simultaneous[kind],
+                    last[f"{name}_error_by_steps"] - getattr(state, f"{name}_error"),
                 ]
             )
             if relative <= tolerance:
