@@ -79,7 +79,7 @@ def measured(test: RandomTest, folder: Path | None) -> Measurement:
         "strips_grew": int(grew),
         DRAWN: int(any(item.is_redrawn for item in test.scenario().random)),
         "final_depth": worn.depth,
-        "reference_strips": len(reference.y),
+        "finer": float((worn.y[1] - worn.y[0]) / (reference.y[1] - reference.y[0])),
         "reference_seconds": float(reference.seconds),
         **_named(OWN, reference.by_strips),
         **_named(OWN + STEPS, reference.by_steps),

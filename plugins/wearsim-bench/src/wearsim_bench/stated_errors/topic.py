@@ -69,6 +69,7 @@ COUNTS = {
     "steps": "steps",
     "solves": "contact solves",
     "strips": "strips",
+    "finer": "width over the reference's",
 }
 ABOUT = (
     "Random wear tests of the default stepper on automatic strips, in five strata: ordinary ones,"
@@ -78,8 +79,8 @@ ABOUT = (
     " after whole turns of the cylinder."
     f" True errors are relative to a solution with steps at a tolerance of {TRUE_TOLERANCE:g}, none"
     " longer than a fiftieth of the passes done, or with each pass solved individually where they"
-    " are few, on strips at least four times finer. Stated errors are the estimates at the end of"
-    " a run. Depth is the greatest depth, profile the L2 norm over all bodies. A test is"
+    " are few, on finer strips. Stated errors are the estimates at the end of a run. Depth is the"
+    " greatest depth, profile the L2 norm over all bodies. A test is"
     f" covered if the stated error is at least the true one, or the true one is below {SMALL:g}."
     f" Ratios, of stated to true errors, are those of tests with a true error above {SMALL:g}."
     " The error of a cam between its stations is left out, as the reference has the same stations."
