@@ -17,7 +17,7 @@ from wearsim.mechanics.numerics.multistep import MAX_ORDER, ROWS, next_steps
 from wearsim.mechanics.numerics.young_strips import AT_START, OLD, WHOLE, mark_strips
 from wearsim.types import BoolArray, FloatArray, IntArray
 
-SHARE = 0.35  # part of the tolerance that a step may add to the profiles
+SHARE = 0.28  # part of the tolerance that a step may add to the profiles
 # early errors decay: they may be greater, by this power of the passes done, and by the other one
 # where edges are resolved
 PART_EXPONENT, EDGES_EXPONENT = 0.25, 0.75

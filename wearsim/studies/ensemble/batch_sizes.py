@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-SECONDS = 4.0  # duration of a batch; a test costs a third more in batches of 20 than of 40
+SECONDS = 6.0  # duration of a batch; a test costs a third more in batches of 20 than of 40
 GROWTH = 32  # greatest ratio of the size of a batch to the greatest before it
 MOST_IN_BATCH = 256  # larger batches are not faster
 LEAST_IN_BATCH = 16  # of those left, if they take less; a batch costs as much as seven tests more
