@@ -18,6 +18,9 @@ from wearsim.types import BoolArray, FloatArray, IntArray
 SETTLED = float(ROWS)  # steps after which all points of a formula lie in contact
 ELASTIC = 0.5
 LEAST, FULL, NONE = 0.1, 0.5, 1.0
+# difference counted for a strip that is loaded ahead of the predicted edge, over the rise: its mean
+# depth is uncertain by an eighth, and held to the tolerance of strips in contact as wholes
+ENTERED = 10.0 / 8.0
 FLAT = 1e-15  # least rise of a gap across a strip [m]
 
 
@@ -308,7 +311,7 @@ def compare_edges(
             if not loads[k, i] > 0.0:
                 rest[v] = max(rest[v], mean - joint)
             elif slopes[k, i] == np.inf:
-                rest[v] = max(rest[v], own)
+                rest[v] = max(rest[v], own, ENTERED * strips.rise[k, i])
                 # loaded ahead of the predicted edge, which is now in its middle
                 level[k, i] = max(level[k, i], strips.first[k, i] + grown)
             else:
