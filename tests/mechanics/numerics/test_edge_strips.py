@@ -10,6 +10,7 @@ import pytest
 
 from wearsim.mechanics.numerics.edge_strips import (
     ELASTIC,
+    ENTERED,
     FLAT,
     FULL,
     LEAST,
@@ -237,11 +238,12 @@ def test_difference_to_the_formula_is_the_greatest_of_all_strips(edges: Edges, p
             assert edges.part_of(k, i, halfway) == pytest.approx(0.5) or edges.part[k, i] == 1.0
             expected_level = max(moved, halfway)
         assert level[k, i] == pytest.approx(expected_level, rel=1e-14)
-        own = edges.wear[:, k, i].sum()
+        own, rise = edges.wear[:, k, i].sum(), edges.strips.rise[k, i]
         if edges.loads[k, i] == 0.0:
             differs = mean - joint
         else:
-            differs = own if slopes[k, i] == np.inf else abs(mean - own - joint)
+            entered = max(own, ENTERED * rise)
+            differs = entered if slopes[k, i] == np.inf else abs(mean - own - joint)
         expected[v, i] = max(expected[v, i], differs)
     np.testing.assert_allclose(rest, expected.max(axis=1), rtol=1e-8)
     for i in range(STRIPS):  # each strip by itself
