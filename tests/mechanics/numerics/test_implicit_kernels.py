@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from wearsim.mechanics.numerics.edge_strips import (
+    OF_EDGES,
     SETTLED,
     compare_edges,
     edge_strips,
@@ -24,7 +25,6 @@ from wearsim.mechanics.numerics.edge_strips import (
     start_edges,
 )
 from wearsim.mechanics.numerics.implicit_step import (
-    OF_EDGES,
     WHOLE_PASSES,
     begin_step,
     compare_step,

@@ -18,9 +18,10 @@ from wearsim.types import BoolArray, FloatArray, IntArray
 SETTLED = float(ROWS)  # steps after which all points of a formula lie in contact
 ELASTIC = 0.5
 LEAST, FULL, NONE = 0.1, 0.5, 1.0
+OF_EDGES = 10.0  # change by which strips partly in contact have converged, over that of the others
 # difference counted for a strip that is loaded ahead of the predicted edge, over the rise: its mean
 # depth is uncertain by an eighth, and held to the tolerance of strips in contact as wholes
-ENTERED = 10.0 / 8.0
+ENTERED = OF_EDGES / 8.0
 FLAT = 1e-15  # least rise of a gap across a strip [m]
 
 

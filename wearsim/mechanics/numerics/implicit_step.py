@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from wearsim.mechanics.numerics.edge_strips import (
+    OF_EDGES,
     compare_edges,
     edge_strips,
     end_edges,
@@ -27,7 +28,6 @@ from wearsim.mechanics.numerics.young_strips import AT_START, OLD, WHOLE, mark_s
 from wearsim.types import BoolArray, FloatArray, IntArray
 
 WHOLE_PASSES = 2.0  # steps above which passes are counted one by one
-OF_EDGES = 10.0  # change by which strips partly in contact have converged, over that of the others
 
 
 @kernel
