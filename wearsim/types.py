@@ -12,6 +12,8 @@ from wearsim.errors import ScenarioError, mistake_in
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
+SingleArray: TypeAlias = npt.NDArray[np.float32]
+
 IntArray: TypeAlias = npt.NDArray[np.int64]
 
 BoolArray: TypeAlias = npt.NDArray[np.bool_]

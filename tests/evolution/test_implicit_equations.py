@@ -160,7 +160,7 @@ def assert_in_equilibrium(problem, before, after, force):
     if end.past_feedback is not None:
         exact = loads - force
         np.testing.assert_allclose(
-            end.past_feedback[0], exact, rtol=0.0, atol=1e-7 * abs(exact).max()
+            end.past_feedback[0], exact, rtol=0.0, atol=1e-6 * abs(exact).max()
         )
 
 

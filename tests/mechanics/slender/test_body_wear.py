@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from wearsim.mechanics.numerics.lu import whole_panels
 from wearsim.mechanics.slender.body_wear import (
     factor_depths,
     fill_responses,
@@ -15,6 +16,7 @@ from wearsim.mechanics.slender.body_wear import (
 from wearsim.mechanics.slender.newton_step import new_newton_state, number_strips
 
 STRIPS = 6
+SINGLE = 1e-6  # error of the steps, which are of single precision
 # bodies of each contact: those of the first column have the lower numbers
 BODIES = {
     "two stations and two rollers": [[0, 2], [1, 2], [0, 3], [1, 3]],
@@ -121,9 +123,9 @@ def test_response_to_a_gap_keeps_the_load(contacts: Contacts) -> None:
     for k in range(contacts.count):
         size, (expected, slope) = int(contacts.state.size[k]), contacts.response(k)
         found = contacts.state.matrix[k, :size, :size].T
-        np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-13)
-        np.testing.assert_allclose(found.sum(axis=0), 0.0, atol=1e-12)
-        np.testing.assert_allclose(system.approach_slope[k, :size], slope, rtol=1e-11)
+        np.testing.assert_allclose(found, expected, rtol=0.0, atol=SINGLE)
+        np.testing.assert_allclose(found.sum(axis=0), 0.0, atol=SINGLE)
+        np.testing.assert_allclose(system.approach_slope[k, :size], slope, atol=SINGLE)
 
 
 def test_strips_of_one_contact_are_no_unknowns(contacts: Contacts) -> None:
@@ -154,8 +156,9 @@ def test_coupled_step_is_that_of_one_dense_system(contacts: Contacts) -> None:
     approach, (steps, expected) = contacts.approach.copy(), contacts.coupled()
     solve_depths(contacts.shared, contacts.state, system, approach)
     for k, step in enumerate(steps):
-        np.testing.assert_allclose(contacts.state.step[k, : len(step)], step, rtol=1e-9)
-    np.testing.assert_allclose(approach, expected, rtol=1e-9)
+        error = 10.0 * SINGLE * np.abs(step).max()
+        np.testing.assert_allclose(contacts.state.step[k, : len(step)], step, rtol=0.0, atol=error)
+    np.testing.assert_allclose(approach, expected, rtol=0.0, atol=10.0 * SINGLE)
 
 
 @pytest.mark.parametrize("side", [0, 1])
@@ -172,4 +175,5 @@ def test_less_numerous_bodies_remain_in_the_outer_system() -> None:
         system = new_depth_system(np.array(bodies), STRIPS)
         assert system.touched[:, 0].tolist() == [pair[touched] for pair in bodies]
         assert system.touched[:, 1].tolist() == [pair[1 - touched] for pair in bodies]
-        assert system.outer.shape == (STRIPS, STRIPS)
+        size = whole_panels(STRIPS)
+        assert system.outer.shape == (size, size)

@@ -40,12 +40,14 @@ from wearsim.mechanics.slender.newton import (
     start_strips,
 )
 from wearsim.mechanics.slender.newton_step import (
+    SMALL,
     correct_residual,
     fill_jacobian,
     new_newton_state,
     number_strips,
 )
 
+SINGLE = 1e-5  # relative error of steps in single precision
 STRIPS, SPACING, MODULUS, CURVATURE = 48, 1.3e-4, 1.15e11, np.array([90.0, 110.0])
 UNIT, TABLE = 1.0 / (np.pi * MODULUS), influence_table(STRIPS)
 Y = SPACING * (np.arange(STRIPS) - 22.0)
@@ -91,7 +93,7 @@ class Contacts:
         find_factors(k, self.line_load, True, SWEEPS, self.lengths)
         arguments = self.state.softness, self.line_load, self.lengths, state
         fill_jacobian(k, TABLE, UNIT, *arguments)
-        found: np.ndarray = state.matrix[k, :size, :size].T
+        found: np.ndarray = state.matrix[k, :size, :size].T.astype(np.float64)
         return found
 
     def wear(self, line_load: np.ndarray) -> np.ndarray:
@@ -212,17 +214,19 @@ def test_residuals_are_those_of_the_deformed_surfaces(shared: bool) -> None:
         followed = slice(state.left[k], state.right[k])
         assert state.left[k] == place[0] - MARGIN
         np.testing.assert_allclose(state.surface[k, followed], surface[k, followed], rtol=1e-12)
-        np.testing.assert_allclose(state.missing[k, :size], -surface[k, place[:size]], rtol=1e-12)
+        missing = surface[k, place[:size]].mean() - surface[k, place[:size]]
+        np.testing.assert_allclose(state.missing[k, :size], missing, atol=1e-12 * surface[k].max())
         unit_load = np.linalg.solve(these.jacobian(k), np.ones(size))
-        np.testing.assert_allclose(state.unit_load[k, :size], unit_load, rtol=1e-9)
-        assert state.unit_load_sum[k] == pytest.approx(unit_load.sum(), rel=1e-9)
+        np.testing.assert_allclose(state.unit_load[k, :size], unit_load, rtol=SINGLE)
+        assert state.unit_load_sum[k] == pytest.approx(unit_load.sum(), rel=SINGLE)
     # the same Jacobians are kept for other loads
     these.line_load *= 1.01
     surface, matrix = these.surface(these.line_load), state.matrix.copy()
     assert these.factor() == (CONTINUE, False)
     for k in range(2):
         size, place = int(state.size[k]), state.place[k]
-        np.testing.assert_allclose(state.missing[k, :size], -surface[k, place[:size]], rtol=1e-12)
+        missing = surface[k, place[:size]].mean() - surface[k, place[:size]]
+        np.testing.assert_allclose(state.missing[k, :size], missing, atol=1e-12 * surface[k].max())
         np.testing.assert_array_equal(state.matrix[k, :size, :size], matrix[k, :size, :size])
 
 
@@ -244,7 +248,7 @@ def test_steps_solve_the_linearised_equations(shared: bool, corrected: bool) -> 
     for k in range(2):
         step[k, state.place[k, : size[k]]] = state.step[k, : size[k]]
         load = (these.line_load + step)[k].sum() * SPACING
-        assert load == pytest.approx(these.loads[k], rel=1e-12)
+        assert load == pytest.approx(these.loads[k], rel=1e-7)
     opened = np.zeros(STRIPS)
     if shared:  # strips of the cylinder that both contacts touch
         both = (these.line_load > 0.0).all(axis=0)
@@ -252,8 +256,10 @@ def test_steps_solve_the_linearised_equations(shared: bool, corrected: bool) -> 
         opened = both * (these.worn[:, 0] * step).sum(axis=0)
     for k in range(2):
         place = state.place[k, : size[k]]
-        found = these.jacobian(k) @ step[k, place] + opened[place] - these.approach[k]
-        np.testing.assert_allclose(found, missing[k, : size[k]], rtol=1e-8)
+        rise = these.approach[k] - state.level[k]
+        found = these.jacobian(k) @ step[k, place] + opened[place] - rise
+        error = SINGLE * np.abs(missing[k, : size[k]]).max()
+        np.testing.assert_allclose(found, missing[k, : size[k]], rtol=0.0, atol=error)
 
 
 def test_contacts_without_a_jacobian_are_refused() -> None:
@@ -277,22 +283,23 @@ def test_contacts_without_a_jacobian_are_refused() -> None:
 class Check:
     """Convergence of two separate contacts without penetrated strips."""
 
-    def __init__(self) -> None:
-        self.these = Contacts(False)
+    def __init__(self, shared: bool = False) -> None:
+        self.these = Contacts(shared)
         self.these.start()
         self.state, self.line_load = self.these.state, self.these.line_load
         for k in range(2):
             number_strips(k, self.line_load, MARGIN, self.state)
             find_factors(k, self.line_load, False, SWEEPS, self.these.lengths)
         self.state.surface[:], self.approach = 2e-6, np.array([1e-6, 1.5e-6])
-        self.state.fresh[:] = False
+        self.state.fresh[:], self.state.change[:] = False, 0.0
 
     def __call__(
         self, change: float, before: float = 0.0, iteration: int = 1, left: bool = False
     ) -> tuple[int, float]:
         result: tuple[int, float] = check_convergence(
-            *(iteration, TOLERANCE, before, change, left, self.these.set, self.these.lengths),
-            *(self.state, self.approach, self.line_load),
+            *(iteration, TOLERANCE, before, change, left, self.these.set),
+            *(self.these.members, self.these.worn),
+            *(self.these.lengths, self.state, self.approach, self.line_load),
         )
         return result
 
@@ -324,18 +331,33 @@ def test_strips_that_leave_or_enter_prolong_the_iteration() -> None:
             assert check(1e-12) == (CONTINUE, 0.0)
             assert check.line_load[k, i] > 0.0
             assert check.state.fresh.tolist() == [k == 0, k == 1]
-    # strips that are not followed are tested at the end only
-    check = Check()
-    check.state.surface[0, check.state.left[0] - 2] = 0.5 * check.approach[0]
-    assert check(1e-5) == (CONTINUE, 1e-5)
+    # strips that are not followed are tested at the end only, the others after large changes too
+    for outwards, change, added in ((2, 2.0 * SMALL, False), (-1, 2.0 * SMALL, True),
+                                    (-1, 0.5 * SMALL, False)):  # fmt: skip
+        check = Check()
+        check.state.surface[0, check.state.left[0] - outwards] = 0.5 * check.approach[0]
+        assert check(change) == (CONTINUE, 0.0 if added else change)
+
+
+def test_unloaded_strips_are_tested_where_the_next_step_has_moved_them() -> None:
+    for shared in (False, True):
+        check = Check(shared)
+        state, i = check.state, int(check.state.left[0]) + 1
+        height = check.approach[0] - 2e-9  # the load of the second contact wears the cylinder
+        state.surface[0, i], state.change[:] = height, 0.0
+        check.these.worn = 1e-12 * np.ones((2, 2, STRIPS)) if shared else None
+        state.change[1, i] = 3e3
+        added = check(1e-12) == (CONTINUE, 0.0)
+        assert added != shared
 
 
 def test_cautious_iterations_add_strips_once_others_have_settled() -> None:
     for iteration, change, left, added in (
         (CAUTIOUS, 2e-3, True, True),
-        (CAUTIOUS + 1, 1.2e-3, False, False),
-        (CAUTIOUS + 1, 0.8e-3, False, True),
-        (CAUTIOUS + 1, 0.8e-3, True, False),
+        (CAUTIOUS, 0.8 * SMALL, False, False),
+        (CAUTIOUS + 1, 1.2 * SMALL, False, False),
+        (CAUTIOUS + 1, 0.8 * SMALL, False, True),
+        (CAUTIOUS + 1, 0.8 * SMALL, True, False),
     ):
         check = Check()
         i = int(check.state.left[0]) + 1

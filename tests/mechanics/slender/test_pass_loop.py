@@ -177,9 +177,10 @@ def check_pass(loop: Loop, p: int, accuracy: float) -> None:
     tolerance = accuracy * work.max()
     rates = loop.wear.depth_per_work
     worn = after["cylinder_depth"] - cylinder
-    np.testing.assert_allclose(worn, rates[0] * work, atol=rates[0] * tolerance)
+    np.testing.assert_allclose(worn, rates[0] * work, rtol=3e-7, atol=rates[0] * tolerance)
     worn = after["roller_depth"][g] - roller
-    np.testing.assert_allclose(worn, rates[1 + g] * work, atol=rates[1 + g] * tolerance)
+    atol = rates[1 + g] * tolerance
+    np.testing.assert_allclose(worn, rates[1 + g] * work, rtol=3e-7, atol=atol)
     power = SPEED[g] * SPACING * work.sum()
     added = after["energy"] - before["energy"]
     assert added[g] == pytest.approx(power, rel=accuracy)
@@ -210,12 +211,12 @@ def test_spring_and_terms_change_the_load_of_a_pass(p: int) -> None:
 def test_spring_of_a_worn_contact_has_a_smaller_load(load: float, stiffness: float) -> None:
     loop = Loop(load=load, stiffness=stiffness)
     loop.fresh[:] = 0.3e-6  # the bodies are worn by more
-    check_pass(loop, 0, 1e-7)
+    check_pass(loop, 0, 2e-7)
     assert loop.loads.line_load[0].sum() * SPACING < load
 
 
 def test_stiff_spring_and_contact_share_their_displacement() -> None:
-    check_pass(Loop(stiffness=3e8), 0, 1e-7)
+    check_pass(Loop(stiffness=3e8), 0, 2e-7)
 
 
 @pytest.mark.parametrize("crown", [5.0, 0.02], ids=["in the middle", "on all strips"])
@@ -256,7 +257,7 @@ def test_far_from_the_anchor_it_is_moved() -> None:
     loop.run(1)
     anchor = loop.loads.anchor.copy()
     loop.passes.base_load[2] = 1.2 * loop.passes.base_load[1]
-    check_pass(loop, 2, 1e-7)
+    check_pass(loop, 2, 2e-7)
     assert (loop.loads.anchor[1] > anchor[1]).any()
 
 

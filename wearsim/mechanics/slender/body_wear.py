@@ -24,7 +24,7 @@ from wearsim.mechanics.numerics.lu import (
     whole_panels,
 )
 from wearsim.mechanics.slender.newton_step import NewtonState
-from wearsim.types import FloatArray, IntArray
+from wearsim.types import FloatArray, IntArray, SingleArray
 
 SIDES = 2  # a contact touches a cylinder and a roller
 
@@ -55,17 +55,17 @@ class DepthSystem(NamedTuple):
     size: IntArray
     touched: IntArray
     side: IntArray
-    block: FloatArray
-    across: FloatArray
-    outer: FloatArray
-    depth: FloatArray
-    outer_depth: FloatArray
+    block: SingleArray
+    across: SingleArray
+    outer: SingleArray
+    depth: SingleArray
+    outer_depth: SingleArray
     total: IntArray
-    approach_slope: FloatArray
-    gap: FloatArray
-    change: FloatArray
+    approach_slope: SingleArray
+    gap: SingleArray
+    change: SingleArray
     unknown: IntArray
-    softness: FloatArray
+    softness: SingleArray
 
 
 @subroutine
@@ -77,7 +77,7 @@ def new_depth_system(bodies: IntArray, n: int) -> DepthSystem:
     contacts, count = bodies.shape[0], bodies.max() + 1
     first = bodies[:, 0].max() + 1  # number of bodies in the first column
     inner = 0 if 2 * first >= count else 1
-    size = min(first, count - first) * n
+    m, size = whole_panels(n), whole_panels(min(first, count - first) * n)
     touched, side = np.empty((contacts, SIDES), np.int64), np.empty(SIDES, np.int64)
     side[0], side[1] = inner, 1 - inner
     for k in range(contacts):
@@ -88,17 +88,17 @@ def new_depth_system(bodies: IntArray, n: int) -> DepthSystem:
         np.empty(count, np.int64),
         touched,
         side,
-        np.empty((count, n, n)),
-        np.empty((count, size, n)),
-        np.empty((size, size)),
-        np.empty((count, n)),
-        np.empty(size),
+        np.empty((count, m, m), np.float32),
+        np.empty((count, size, m), np.float32),
+        np.empty((size, size), np.float32),
+        np.empty((count, m), np.float32),
+        np.empty(size, np.float32),
         np.zeros(1, np.int64),
-        np.empty((contacts, n)),
-        np.empty(whole_panels(n)),
-        np.empty(n),
+        np.empty((contacts, n), np.float32),
+        np.empty(m, np.float32),
+        np.empty(n, np.float32),
         np.empty((SIDES, n), np.int64),
-        np.empty((SIDES, n)),
+        np.empty((SIDES, n), np.float32),
     )
 
 
@@ -114,12 +114,12 @@ def fill_responses(k: int, state: NewtonState, system: DepthSystem) -> bool:
         return False
     unit_load[k] = 0.0
     for column in range(size):
-        s0 = s1 = s2 = s3 = 0.0
+        s0 = s1 = s2 = s3 = np.float32(0.0)
         for row in range(0, size, PANEL):
             s0, s1 = s0 + matrix[k, column, row], s1 + matrix[k, column, row + 1]
             s2, s3 = s2 + matrix[k, column, row + 2], s3 + matrix[k, column, row + 3]
         approach_slope[k, column] = (s0 + s1) + (s2 + s3)
-        total += approach_slope[k, column]
+        total += float(approach_slope[k, column])
         for row in range(size):
             unit_load[k, row] += matrix[k, column, row]
     state.unit_load_sum[k] = total
@@ -131,7 +131,7 @@ def fill_responses(k: int, state: NewtonState, system: DepthSystem) -> bool:
 
 
 @subroutine
-def open_gaps(k: int, state: NewtonState, system: DepthSystem, change: FloatArray) -> float:
+def open_gaps(k: int, state: NewtonState, system: DepthSystem, change: SingleArray) -> float:
     """Add the change of the line loads of contact `k`, by row, as its gaps open by `gap`.
 
     Returns the increase of the approach [m].
@@ -147,7 +147,7 @@ def open_gaps(k: int, state: NewtonState, system: DepthSystem, change: FloatArra
                 matrix[k, c2, row] * g2 + matrix[k, c3, row] * g3
             )
     for column in range(size):
-        rise += system.approach_slope[k, column] * gap[column]
+        rise += float(system.approach_slope[k, column] * gap[column])
     return rise
 
 
@@ -319,8 +319,8 @@ def subtract_outer_wear(
     shared: FloatArray,
     state: NewtonState,
     system: DepthSystem,
-    depth: FloatArray,
-    result: FloatArray,
+    depth: SingleArray,
+    result: SingleArray,
 ) -> None:
     """Subtract the wear of the outer body of contact `k` due to depths of its eliminated body.
 
@@ -395,8 +395,8 @@ def solve_depths(
         for row in range(state.size[k]):
             i, opening = place[k, row], 0.0
             if b >= 0 and number[b, i] >= 0:
-                opening += depth[b, number[b, i]]
+                opening += float(depth[b, number[b, i]])
             if c >= 0 and number[c, i] >= 0:
-                opening += outer_depth[number[c, i]]
+                opening += float(outer_depth[number[c, i]])
             system.gap[row] = opening
         approach[k] += open_gaps(k, state, system, step[k])

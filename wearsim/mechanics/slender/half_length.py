@@ -27,6 +27,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wearsim.mechanics.numerics.jit import subroutine, subroutine_of
+from wearsim.mechanics.numerics.lu import whole_panels
 from wearsim.mechanics.slender.influence import HIGHEST, interpolation
 from wearsim.types import FloatArray, IntArray
 
@@ -314,6 +315,7 @@ def find_factors(
     total, weight = lengths.work[0], lengths.work[1]
     factor, log_ratio = lengths.factor, lengths.log_ratio
     first, last = _find_span(k, line_load)
+    end = min(first + whole_panels(last + 1 - first), line_load.shape[1]) - 1  # of whole vectors
     widest, log_scale = -np.inf, lengths.log_scale[k]
     for j in range(line_load.shape[1]):
         factor[k, j], weight[j] = 1.0, 0.0
@@ -325,11 +327,11 @@ def find_factors(
     for sweep in range(sweeps):
         if widest > HIGHEST:
             break
-        for j in range(first, last + 1):
+        for j in range(first, end + 1):
             total[j] = 0.0
             if line_load[k, j] > 0.0:
                 weight[j] = 0.25 / factor[k, j]
-        add_influences(lengths.table, k, first, last, weight, log_ratio, total)
+        add_influences(lengths.table, k, first, end, weight, log_ratio, total)
         if sloped:
             _fill_near(k, first, last, lengths.table, weight, lengths)
             _add_slopes(k, first, last, total, sweep > 0, lengths)
@@ -366,9 +368,12 @@ def add_length_slopes(
     _gather(k, first, last, 2 * REACH, lengths.near, lengths)
     for j in range(first, last + 1):
         column, scale = index[k, j], 1.0 / max(line_load[k, j], 1e-300)
-        for i in range(max(first, j - 2 * REACH), min(last, j + 2 * REACH) + 1):
-            if column >= 0 and index[k, i] >= 0:
-                matrix[column, index[k, i]] += scale * gathered[j - i + 2 * REACH, i]
+        start, stop = max(first, j - 2 * REACH), min(last, j + 2 * REACH) + 1
+        here = np.uint64(j + 2 * REACH)
+        for i in range(np.uint64(start), np.uint64(stop if column >= 0 else start)):
+            row = index[k, i]
+            if row >= 0:
+                matrix[np.uint64(column), np.uint64(row)] += scale * gathered[here - i, i]
 
 
 @subroutine

@@ -43,6 +43,7 @@ from wearsim.mechanics.slender.half_length import (
 )
 from wearsim.mechanics.slender.influence import HIGHEST
 from wearsim.mechanics.slender.newton_step import (
+    SMALL,
     NewtonState,
     add_approach,
     add_displacement,
@@ -51,7 +52,9 @@ from wearsim.mechanics.slender.newton_step import (
     correct_residual,
     factor_jacobian,
     fill_jacobian,
+    fill_missing,
     fill_separation,
+    has_large_step,
     new_newton_state,
     number_strips,
     predict_surface,
@@ -65,11 +68,10 @@ CONTINUE = -1
 
 # predicted change of the next step, relative to the greatest line load; where contacts wear, their
 # wear compliance is iterated in each step of the wear test, and less accuracy is sufficient
-TOLERANCE, WEAR_TOLERANCE = 1e-8, 1e-6
+TOLERANCE, WEAR_TOLERANCE = 3e-8, 1e-6
 SHRINKING = 0.2  # ratio of successive steps up to which Jacobians may be reused
 FIRST = 0.1  # assumed ratio of the second step to the first
 MUCH = 0.05  # share of the load that starting line loads lack and a foundation corrects
-SMALL = 1e-3  # relative change since the Jacobian up to which its nonlinear part is neglected
 AT_BEST = 0.005  # least assumed ratio of successive steps, as the Jacobian is approximate
 GAP_TOLERANCE = 1e-8  # of the approach
 FIRST_FOUNDATION = 8.0  # elastic compliance of strips without displacement, in 1/(pi E*)
@@ -143,6 +145,8 @@ def check_convergence(
     change: float,
     left: bool,
     these: ContactSet,
+    members: Any,
+    worn: Any,
     lengths: HalfLengths,
     state: NewtonState,
     approach: FloatArray,
@@ -150,12 +154,15 @@ def check_convergence(
 ) -> tuple[int, float]:
     """Add penetrated strips, mark contacts that need a new Jacobian and test for convergence.
 
-    The strips that are not followed are tested where the others have converged.
+    Unloaded strips are tested after a large change, and where the loaded ones have converged; those
+    that are not followed are tested then only.
 
     Parameters
     ----------
     tolerance : float
         As of `solve_slender`.
+    members, worn
+        As of `start_strips`.
     before : float
         Change of the previous step, 0 if the active set was another one.
     change, left
@@ -171,17 +178,20 @@ def check_convergence(
     if not change < np.inf:
         return NOT_FINITE, change
     contacts, entered, unit = line_load.shape[0], False, these.unit
-    ready = iteration <= CAUTIOUS or (change < 1e-3 and not left)
-    for k in range(contacts if ready else 0):
-        first, end = state.left[k], state.right[k]
-        entered |= add_penetrated(k, first, end, iteration, unit, state, approach, line_load)
     shrinking = min(max(change / before, AT_BEST), 1.0) if before > 0.0 else FIRST
     if not shrinking < SHRINKING:
         state.fresh[:] = True
-    if left or entered:
-        return CONTINUE, 0.0
-    if not change * shrinking < tolerance:
-        return CONTINUE, change
+    small, converged = change <= SMALL, not left and change * shrinking < tolerance
+    if (converged or not small) if iteration <= CAUTIOUS else (small and not left):
+        for k in range(contacts):
+            predict_surface(k, these.table, unit, lengths.log_ratio, state)
+        if members is not None:
+            add_depths(members, worn, state.change, state.surface)
+        for k in range(contacts):
+            first, end = state.left[k], state.right[k]
+            entered |= add_penetrated(k, first, end, iteration, unit, state, approach, line_load)
+    if left or entered or not converged:
+        return CONTINUE, 0.0 if left or entered else change
     for k in range(contacts):
         first, end = complete_surface(k, approach[k], these.table, unit, line_load, lengths, state)
         entered |= add_penetrated(k, first, end, iteration, unit, state, approach, line_load)
@@ -317,8 +327,7 @@ def factor_contacts(
                 state.fresh[k] = not fill_responses(k, state, system)
         if state.fresh[k] or not abs(state.unit_load_sum[k]) > 0.0:
             return SINGULAR, renewed
-        for row in range(state.size[k]):
-            state.missing[k, row] = -surface[k, state.place[k, row]]
+        fill_missing(k, state)
     if members is not None and renewed and not factor_depths(worn, state, system):
         return SINGULAR, renewed
     return CONTINUE, renewed
@@ -464,19 +473,14 @@ def solve_slender(
                 )
                 if outcome != CONTINUE:
                     break
-                # the second sweep corrects the Jacobian by the nonlinearity of large changes
-                for sweep in range(2 if renewed or stale > SMALL else 1):
-                    fill_steps(
-                        these, members, wear, system, sweep > 0, total, delta, lengths, state
-                    )
+                fill_steps(these, members, wear, system, False, total, delta, lengths, state)
+                if stale > SMALL or has_large_step(total, state):  # nonlinear part of large changes
+                    fill_steps(these, members, wear, system, True, total, delta, lengths, state)
                 change, left = update_loads(total, state, iteration > CAUTIOUS)
                 stale = change if renewed else stale + change
-                for k in range(contacts):
-                    predict_surface(k, table, unit, lengths.log_ratio, state)
-                if bodies is not None:
-                    add_depths(members, wear, state.change, state.surface)
                 outcome, before = check_convergence(
-                    iteration, tolerance, before, change, left, these, lengths, state, delta, total
+                    *(iteration, tolerance, before, change, left, these, members, wear),
+                    *(lengths, state, delta, total),
                 )
                 if outcome == CONTINUE and iteration == MAX_ITERATIONS:
                     outcome = NO_CONVERGENCE

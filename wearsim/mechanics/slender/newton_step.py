@@ -16,10 +16,11 @@ from wearsim.mechanics.slender.half_length import (
     add_length_slopes,
 )
 from wearsim.mechanics.slender.influence import HIGHEST, interpolation
-from wearsim.types import BoolArray, FloatArray, IntArray
+from wearsim.types import BoolArray, FloatArray, IntArray, SingleArray
 
 MANIFOLD = 3.0  # ratio of new to old load of a strip up to which the Jacobian may be reused
 REUSED = 0.1  # change over the greatest line load up to which it may be reused
+SMALL = 1e-3  # relative change since the Jacobian up to which its nonlinear part is neglected
 MAX_CORRECTED = 0.5  # relative change of a load up to which the residual is corrected
 
 
@@ -46,12 +47,13 @@ class NewtonState(NamedTuple):
     rows: IntArray
     left: IntArray
     right: IntArray
-    matrix: FloatArray
-    unit_load: FloatArray
+    matrix: SingleArray
+    unit_load: SingleArray
     unit_load_sum: FloatArray
     diagonal: FloatArray
     missing: FloatArray
-    step: FloatArray
+    level: FloatArray
+    step: SingleArray
     change: FloatArray
     surface: FloatArray
     softness: FloatArray
@@ -70,12 +72,13 @@ def new_newton_state(contacts: int, n: int) -> NewtonState:
         np.empty((contacts, n), np.int64),
         np.empty(contacts, np.int64),
         np.empty(contacts, np.int64),
-        np.empty((contacts, m, m)),
-        np.empty((contacts, n)),
+        np.empty((contacts, m, m), np.float32),
+        np.empty((contacts, m), np.float32),
         np.empty(contacts),
         np.empty((contacts, n)),
         np.empty((contacts, n)),
-        np.empty((contacts, n)),
+        np.empty(contacts),
+        np.empty((contacts, m), np.float32),
         np.empty((contacts, n)),
         np.empty((contacts, n)),
         np.empty((contacts, n)),
@@ -296,9 +299,24 @@ def factor_jacobian(k: int, state: NewtonState) -> bool:
         return False
     solve_factored(state.matrix[k], size, state.unit_load[k])
     for row in range(size):
-        total += state.unit_load[k, row]
+        total += float(state.unit_load[k, row])
     state.unit_load_sum[k] = total
     return True
+
+
+@subroutine
+def fill_missing(k: int, state: NewtonState) -> None:
+    """Fill the residual of contact `k` and the mean height of its surface, from `surface`.
+
+    The residual is relative to that mean: steps in single precision would otherwise be the
+    difference of two line loads of the size of the whole.
+    """
+    size, place, surface, total = state.size[k], state.place, state.surface, 0.0
+    for row in range(size):
+        total += surface[k, place[k, row]]
+    state.level[k] = total / size
+    for row in range(size):
+        state.missing[k, row] = state.level[k] - surface[k, place[k, row]]
 
 
 @subroutine
@@ -310,9 +328,23 @@ def add_approach(
     lacking = load
     for row in range(size):
         lacking -= line_load[k, state.place[k, row]] + step[row]
-    approach[k] = lacking / state.unit_load_sum[k]
+    rise = lacking / state.unit_load_sum[k]
+    approach[k] = state.level[k] + rise
     for row in range(size):
-        step[row] += state.unit_load[k, row] * approach[k]
+        step[row] += state.unit_load[k, row] * rise
+
+
+@subroutine
+def has_large_step(line_load: FloatArray, state: NewtonState) -> bool:
+    """Return whether a line load changes by more than `SMALL` of the greatest of its contact."""
+    for k in range(line_load.shape[0]):
+        peak = greatest = 0.0
+        for row in range(state.size[k]):
+            peak = max(peak, line_load[k, state.place[k, row]])
+            greatest = max(greatest, abs(state.step[k, row]))
+        if not greatest <= SMALL * peak:
+            return True
+    return False
 
 
 @subroutine
