@@ -11,6 +11,7 @@ from wearsim_bench.measure.measurement import Effort, Measurement, OnProgress, T
 from wearsim_bench.stepping.groups import (
     CLOSER,
     CONVERGED,
+    FINEST,
     Report,
     StepperBenchmark,
     of_model,
@@ -44,9 +45,11 @@ ABOUT = (
     f" the reference is LSODA of scipy at a tolerance of {CONVERGED:g} with the same contact model."
     " The error of this reference is the difference of its profile from that of BDF at the same"
     " tolerance, or of LSODA at ten times the tolerance; smaller errors are replaced by it. The"
-    " reference for numbers of strips has twice the default number and is computed by LSODA at a"
-    f" tolerance of {CLOSER:g}; these errors include those of stepping. A tolerance of the steppers"
-    " of wearsim applies to the whole test, one of BDF and LSODA to each step, so that equal"
+    f" reference for numbers of strips has {FINEST} times the default number and is computed by"
+    f" LSODA at a tolerance of {CLOSER:g}; its error is the larger of the differences from half as"
+    " many strips and from ten times the tolerance, and the errors include those of stepping. A"
+    " tolerance of the steppers of wearsim applies to the whole test, one of BDF and LSODA to each"
+    " step, so that equal"
     " tolerances do not mean equal errors. BDF and LSODA use the wear per pass of the same contacts"
     " and its Jacobian by finite differences, which LSODA requires only while the problem is stiff,"
     f" and at most {MOST_SOLVES} contact solves. The methods of a group are timed in turns; times"
