@@ -20,7 +20,9 @@ from wearsim.types import BoolArray, FloatArray, IntArray, SingleArray
 
 MANIFOLD = 3.0  # ratio of new to old load of a strip up to which the Jacobian may be reused
 REUSED = 0.1  # change over the greatest line load up to which it may be reused
-SMALL = 1e-3  # relative change since the Jacobian up to which its nonlinear part is neglected
+# relative change since the Jacobian up to which its nonlinear part is neglected, and change of an
+# iteration up to which unloaded strips are not tested before the end
+SMALL = 1e-3
 MAX_CORRECTED = 0.5  # relative change of a load up to which the residual is corrected
 
 
@@ -34,11 +36,11 @@ class NewtonState(NamedTuple):
     bodies, by S of `body_wear`.
     `unit_load` are the loads per unit of approach [N/m^2] and `unit_load_sum` is their sum.
     `diagonal` is the derivative of the displacement of each strip by its own load, `missing` the
-    residual [m], `step` the step by row [N/m] and `change` the applied change of load by strip
-    [N/m]. `surface` is the sum of gap and displacement above the least gap `lowest` [m], complete
-    for the followed strips. `softness` is the wear compliance of the strips of each contact,
-    including that of shared bodies where no other contact touches them [m/(N/m)]; `weight` is work
-    space.
+    residual relative to `level`, the mean of the surface [m], `step` the step by row [N/m] and
+    `change` the applied change of load by strip [N/m]. `surface` is the sum of gap and displacement
+    above the least gap `lowest` [m], complete for the followed strips. `softness` is the wear
+    compliance of the strips of each contact, including that of shared bodies where no other contact
+    touches them [m/(N/m)]; `weight` is work space.
     """
 
     fresh: BoolArray
